@@ -1,0 +1,98 @@
+//! One tick of the charger: a state in, an action out.
+//!
+//! The loop never fails: a rejected table or a state that no law covers is answered by the baseline droop, and the
+//! action says so.
+
+use crate::droop::Droop;
+use crate::phase::{Phase, PhaseState, Step};
+use crate::table::{TableError, TableView};
+use crate::units::{Participation, State};
+
+/// Who decided the participation.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Source {
+    /// The table, by the law of the action's phase.
+    Table,
+    /// The baseline droop, because no law of the table covers the state.
+    DroopOutside,
+    /// The baseline droop, because the table was rejected at start-up.
+    DroopNoTable,
+}
+
+/// What the charger does until the next tick.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Action {
+    /// Share of the fleet that is to respond.
+    pub participation: Participation,
+    /// The law in force.
+    pub phase: Phase,
+    /// Who decided.
+    pub source: Source,
+}
+
+/// The control loop over a table that was accepted or rejected at start-up.
+#[derive(Debug, Clone)]
+pub struct ControlLoop<'t> {
+    table: Result<TableView<'t>, TableError>,
+    droop: Droop,
+    state: PhaseState,
+}
+
+impl<'t> ControlLoop<'t> {
+    /// A loop before the event. `bytes` is the flash image of the table; if it is rejected, [`Droop::PAPER`] is in force
+    /// for good.
+    pub fn new(bytes: &'t [u8]) -> Self {
+        Self::with_table(TableView::parse(bytes))
+    }
+
+    /// The same for a table that was parsed already.
+    pub fn with_table(table: Result<TableView<'t>, TableError>) -> Self {
+        let droop = match &table {
+            Ok(view) => view.header().droop,
+            Err(_) => Droop::PAPER,
+        };
+        Self {
+            table,
+            droop,
+            state: PhaseState::INITIAL,
+        }
+    }
+
+    /// Why the table was rejected, if it was.
+    pub fn table_error(&self) -> Option<TableError> {
+        self.table.as_ref().err().copied()
+    }
+
+    /// Phase, level and clock as they stand.
+    pub fn phase_state(&self) -> PhaseState {
+        self.state
+    }
+
+    /// Advances by one tick (`sampling.watch_s`) with the state measured at it.
+    pub fn step(&mut self, state: State) -> Action {
+        let Ok(table) = &self.table else {
+            self.state.phase = Phase::Fallback;
+            return Action {
+                participation: self.droop.participation(state),
+                phase: Phase::Fallback,
+                source: Source::DroopNoTable,
+            };
+        };
+        let (next, step) = self.state.step(table, state);
+        self.state = next;
+        let (participation, source) = match step {
+            Step::Level(level) => (table.header().participation(level), Source::Table),
+            Step::Outside => (self.droop.participation(state), Source::DroopOutside),
+        };
+        Action {
+            participation,
+            phase: next.phase,
+            source,
+        }
+    }
+
+    /// Forgets the event: back to No control.
+    pub fn reset(&mut self) {
+        self.state = PhaseState::INITIAL;
+    }
+}

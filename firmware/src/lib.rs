@@ -1,0 +1,32 @@
+//! The device side of Holdfast, and whatever both sides must agree on.
+//!
+//! The modules in the order in which a measurement becomes a charging power:
+//!
+//! | module | turns | into |
+//! |---|---|---|
+//! | [`units`] | the quantities of the grid model | integers in micro-units, the same on host and target |
+//! | [`observer`] | measured frequency | the grid state (f, g, l, p) |
+//! | [`grid`] | a state | a cell, by the only quantiser there is |
+//! | [`table`] | a cell | an input level, or "outside" |
+//! | [`phase`] | state and table | the law in force: No control, C1, C2, Fixed, Hold |
+//! | [`droop`] | a frequency | the baseline participation, used as the fallback |
+//! | [`control_loop`] | one state a tick | one [`control_loop::Action`] a tick |
+//!
+//! Nothing here allocates, recurses or panics; nothing is `unsafe`. Everything that decides is integer arithmetic,
+//! so the host's abstraction and verifier, the simulator and the charger compute the same bits.
+#![no_std]
+#![forbid(unsafe_code)]
+
+pub mod units;
+
+pub mod observer;
+
+pub mod grid;
+
+pub mod table;
+
+pub mod phase;
+
+pub mod droop;
+
+pub mod control_loop;

@@ -1,0 +1,121 @@
+//! The phase machine: which law is in force, and when it decides.
+//!
+//! The paper's phases (its section V-A) and the two clocks of the spec's `[sampling]`:
+//!
+//! | phase | in force | examined |
+//! |---|---|---|
+//! | No control | from the event until f leaves I1; no charger responds | every tick |
+//! | C1 | f outside I1 | every period, counted from the switch |
+//! | C2 | f in I1, outside I2 | every period, counted from the switch |
+//! | Fixed | f in I2; the last participation is held | every tick |
+//! | Hold | with `stay`: the state is in the safety law's domain | every period, counted from the switch |
+//!
+//! A *decision* tries the laws in the order Hold, Fixed, C2, C1 and takes the first that applies and has an entry for
+//! the cell. With none, the answer is [`Step::Outside`] and the next tick decides again: the caller runs the baseline
+//! droop meanwhile.
+
+use crate::table::{Law, TableView};
+use crate::units::State;
+
+/// The law in force.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub enum Phase {
+    /// Inside I1 since the event: no charger responds.
+    NoControl,
+    /// The law that reaches I1.
+    C1,
+    /// The law that reaches I2.
+    C2,
+    /// Inside I2: the last participation is held.
+    Fixed,
+    /// The law that keeps f in I2 for ever.
+    Hold,
+    /// No law has an entry for the state: the baseline droop.
+    Fallback,
+}
+
+/// What a tick decided.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Step {
+    /// Apply this input level.
+    Level(u8),
+    /// No law has an entry for the state.
+    Outside,
+}
+
+/// Phase, held level and clock: everything the machine remembers.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub struct PhaseState {
+    /// The law in force.
+    pub phase: Phase,
+    /// Input level held since the last decision.
+    pub level: u8,
+    /// Ticks until the next decision; 0 decides at the next tick. Always 0 in No control, Fixed and Fallback.
+    pub ticks_left: u16,
+}
+
+impl PhaseState {
+    /// The state before the event.
+    pub const INITIAL: Self = Self {
+        phase: Phase::NoControl,
+        level: 0,
+        ticks_left: 0,
+    };
+
+    /// Advances by one tick with the state measured at it; pure, so that the verifier can call it on any state.
+    #[must_use]
+    pub fn step(self, table: &TableView<'_>, state: State) -> (Self, Step) {
+        let header = table.header();
+        match self.phase {
+            Phase::NoControl if header.outer.contains(state) => (self, Step::Level(self.level)),
+            Phase::Fixed if header.inner.contains(state) => (self, Step::Level(self.level)),
+            Phase::C1 | Phase::C2 | Phase::Hold if self.ticks_left > 0 => {
+                let ticks_left = self.ticks_left - 1;
+                (Self { ticks_left, ..self }, Step::Level(self.level))
+            }
+            _ => self.decide(table, state),
+        }
+    }
+
+    fn decide(self, table: &TableView<'_>, state: State) -> (Self, Step) {
+        let header = table.header();
+        let cell = header.grid.quantise(state);
+        let law = |law: Law| cell.and_then(|cell| table.lookup(law, cell));
+        // The decision holds for this tick and `period_ticks - 1` more.
+        let held = |phase, level| {
+            let ticks_left = header.period_ticks - 1;
+            let next = Self {
+                phase,
+                level,
+                ticks_left,
+            };
+            (next, Step::Level(level))
+        };
+        if let Some(level) = law(Law::Hold) {
+            return held(Phase::Hold, level);
+        }
+        if !header.stay && header.inner.contains(state) {
+            let next = Self {
+                phase: Phase::Fixed,
+                level: self.level,
+                ticks_left: 0,
+            };
+            return (next, Step::Level(self.level));
+        }
+        if header.outer.contains(state)
+            && let Some(level) = law(Law::C2)
+        {
+            return held(Phase::C2, level);
+        }
+        if let Some(level) = law(Law::C1) {
+            return held(Phase::C1, level);
+        }
+        let next = Self {
+            phase: Phase::Fallback,
+            level: self.level,
+            ticks_left: 0,
+        };
+        (next, Step::Outside)
+    }
+}
+

@@ -1,0 +1,199 @@
+//! The flash image: a header, then one block per law, then a CRC.
+//!
+//! Reader ([`TableView`]) and writer ([`write`]) of the format live here, so that they cannot drift apart;
+//! `docs/table-format.md` gives the same bytes in prose. All integers are little-endian.
+//!
+//! The image is checked once, by [`TableView::parse`]. After that every lookup is total: it ends within the bound of the
+//! law's directory entry, reads only inside its block and answers `None` for a cell that the law does not cover.
+
+mod bytes;
+mod dense;
+mod header;
+mod law;
+mod write;
+
+pub use dense::{DENSE_HEADER_LEN, DenseView, bits_per_entry};
+pub use header::{
+    BYTE_ORDER_MARK, CRC_LEN, DIRECTORY_ENTRY_LEN, FORMAT_VERSION, HEADER_LEN, Header, LAWS, LEVELS_MAX, Law,
+    LawEntry, MAGIC, PlantParameters, SPEC_HASH_LEN,
+};
+pub use law::{Encoding, InputsKind, LawView};
+pub use write::{WriteError, write_header, seal};
+
+use crate::grid::{Cell, GridError};
+
+/// CRC-32 as in Ethernet and zip (polynomial 0x04C11DB7 reflected).
+const CRC: crc::Crc<u32> = crc::Crc::<u32>::new(&crc::CRC_32_ISO_HDLC);
+
+/// CRC-32 of a stretch of bytes, as the table's trailer stores it.
+pub fn checksum(bytes: &[u8]) -> u32 {
+    CRC.checksum(bytes)
+}
+
+/// Why an image was rejected.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum TableError {
+    /// Fewer bytes than a header and a CRC.
+    TooShort {
+        /// Bytes found.
+        found: u32,
+        /// Bytes that every table has.
+        needed: u32,
+    },
+    /// The first four bytes are not `MAGIC`.
+    BadMagic {
+        /// Bytes found.
+        found: [u8; 4],
+    },
+    /// The byte-order mark is swapped: written on a big-endian machine.
+    WrongEndianness,
+    /// Neither the byte-order mark nor its swap.
+    BadByteOrderMark {
+        /// Value found.
+        found: u16,
+    },
+    /// Another version of the format.
+    UnsupportedVersion {
+        /// Version found.
+        found: u16,
+        /// The version that this reader reads.
+        supported: u16,
+    },
+    /// The header's length is not the image's.
+    WrongLength {
+        /// Bytes in the image.
+        found: u32,
+        /// Length that the header states.
+        stated: u32,
+    },
+    /// The CRC does not match.
+    BadCrc {
+        /// CRC of the bytes.
+        computed: u32,
+        /// CRC in the trailer.
+        stored: u32,
+    },
+    /// The table was made from another spec.
+    ForeignSpec {
+        /// Hash in the header.
+        found: [u8; SPEC_HASH_LEN],
+        /// Hash expected.
+        expected: [u8; SPEC_HASH_LEN],
+    },
+    /// The header's grid is impossible.
+    BadGrid(GridError),
+    /// A header field is out of its range.
+    BadField {
+        /// Offset of the field in the image.
+        offset: u16,
+    },
+    /// The block of a law is malformed.
+    BadBlock {
+        /// The law.
+        law: Law,
+        /// Why.
+        reason: BlockError,
+    },
+}
+
+/// Why the block of a law is malformed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum BlockError {
+    /// The block reaches past the image, or blocks overlap or leave gaps.
+    OutOfImage,
+    /// An encoding that this reader does not know.
+    UnknownEncoding {
+        /// Kind found.
+        found: u8,
+    },
+    /// The block's own header contradicts its length or the grid.
+    BadShape,
+    /// An entry names an input level that does not exist.
+    BadLevel,
+    /// A lookup could take more visits than the directory states.
+    TooManyVisits,
+}
+
+/// A table that was checked; lookups are total.
+#[derive(Debug, Clone)]
+pub struct TableView<'t> {
+    header: Header,
+    laws: [Option<LawView<'t>>; LAWS],
+    bytes: &'t [u8],
+}
+
+impl<'t> TableView<'t> {
+    /// Checks an image and gives access to it.
+    ///
+    /// # Errors
+    /// The first thing that is wrong with it, as a [`TableError`].
+    pub fn parse(bytes: &'t [u8]) -> Result<Self, TableError> {
+        let header = Header::parse(bytes)?;
+        let mut laws = [None, None, None];
+        let mut at = HEADER_LEN;
+        for law in Law::ALL {
+            let entry = header.laws[law as usize];
+            let Some(entry) = entry else { continue };
+            let bad = |reason| TableError::BadBlock { law, reason };
+            let end = at
+                .checked_add(entry.domain_len as usize)
+                .and_then(|end| end.checked_add(entry.inputs_len as usize))
+                .filter(|end| *end <= bytes.len() - CRC_LEN)
+                .ok_or(bad(BlockError::OutOfImage))?;
+            let (domain, inputs) = bytes[at..end].split_at(entry.domain_len as usize);
+            let view = LawView::parse(&entry, domain, inputs, &header).map_err(bad)?;
+            laws[law as usize] = Some(view);
+            at = end;
+        }
+        if at != bytes.len() - CRC_LEN {
+            let last = TableError::BadBlock {
+                law: Law::Hold,
+                reason: BlockError::OutOfImage,
+            };
+            return Err(last);
+        }
+        Ok(Self {
+            header,
+            laws,
+            bytes,
+        })
+    }
+
+    /// The same, and the table must have been made from this spec.
+    ///
+    /// # Errors
+    /// As [`TableView::parse`], and [`TableError::ForeignSpec`].
+    pub fn parse_for_spec(
+        bytes: &'t [u8],
+        expected: [u8; SPEC_HASH_LEN],
+    ) -> Result<Self, TableError> {
+        let view = Self::parse(bytes)?;
+        if view.header.spec_hash != expected {
+            return Err(TableError::ForeignSpec {
+                found: view.header.spec_hash,
+                expected,
+            });
+        }
+        Ok(view)
+    }
+
+    /// The header.
+    pub fn header(&self) -> &Header {
+        &self.header
+    }
+
+    /// The whole image.
+    pub fn bytes(&self) -> &'t [u8] {
+        self.bytes
+    }
+
+    /// A law's reader, if the table has the law.
+    pub fn law(&self, law: Law) -> Option<&LawView<'t>> {
+        self.laws[law as usize].as_ref()
+    }
+
+    /// Input level of a law at a cell; `None` outside the law's domain, or if the table has no such law.
+    pub fn lookup(&self, law: Law, cell: Cell) -> Option<u8> {
+        self.laws[law as usize].as_ref()?.lookup(cell)
+    }
+}

@@ -1,0 +1,2 @@
+//! The host side of Holdfast.
+#![forbid(unsafe_code)]
