@@ -52,7 +52,13 @@ impl ObserverConfig {
         let lead = t1 / tg;
         let rate = [
             [-dt / tg, 0.0, 0.0, k * dt / tg, 0.0],
-            [(1.0 - lead) * dt / t2, -dt / t2, 0.0, lead * k * dt / t2, 0.0],
+            [
+                (1.0 - lead) * dt / t2,
+                -dt / t2,
+                0.0,
+                lead * k * dt / t2,
+                0.0,
+            ],
             [0.0, dt / tt, -dt / tt, 0.0, 0.0],
             [0.0, 0.0, 0.0, 0.0, 1.0],
             [0.0; AUGMENTED],
