@@ -9,3 +9,4 @@ pub mod plant;
 pub mod spec;
 pub mod synthesis;
 pub mod usage;
+pub mod verify;
