@@ -56,7 +56,8 @@ pub fn run(args: &BuildArgs) -> Result<(), Failure> {
     let synthesis = synthesis::synthesise(&spec, &progress::watch)?;
     let synth = SynthReport::new(&spec, &synthesis);
     let bytes = pipeline::emit(&spec, &synthesis).map_err(Failure::bad)?;
-    let table = TableView::parse(&bytes).map_err(|error| Failure::BadInput(format!("{error:?}")))?;
+    let table =
+        TableView::parse(&bytes).map_err(|error| Failure::BadInput(format!("{error:?}")))?;
     let run = closed_loop::simulate(&spec, &table, &Scenario::of(&spec), Estimator::FullState)
         .map_err(Failure::bad)?;
     let report = BuildReport {
@@ -68,7 +69,10 @@ pub fn run(args: &BuildArgs) -> Result<(), Failure> {
         phases: &run.phases,
     };
     let json = serde_json::to_string_pretty(&report).map_err(Failure::bad)?;
-    let files = [("table.bin", bytes.as_slice()), ("build.json", json.as_bytes())];
+    let files = [
+        ("table.bin", bytes.as_slice()),
+        ("build.json", json.as_bytes()),
+    ];
     write_all(&args.out, &files)?;
     if args.output.json {
         output::line(json);
@@ -111,7 +115,10 @@ fn print_encodings(report: &BuildReport<'_>) {
         ]);
     }
     output::line(table);
-    output::line(format_args!("table: {} bytes", output::grouped(report.table_bytes)));
+    output::line(format_args!(
+        "table: {} bytes",
+        output::grouped(report.table_bytes)
+    ));
 }
 
 /// Lower-case hexadecimal.

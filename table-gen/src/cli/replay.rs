@@ -61,7 +61,8 @@ pub fn run(args: &ReplayArgs) -> Result<(), Failure> {
     let trace = trace::read(&args.trace, args.fill_gaps).map_err(Failure::bad)?;
     progress::catch_interrupts();
     let bytes = pipeline::table_bytes(&spec, args.table.as_deref(), &progress::watch)?;
-    let table = TableView::parse(&bytes).map_err(|error| Failure::BadInput(format!("{error:?}")))?;
+    let table =
+        TableView::parse(&bytes).map_err(|error| Failure::BadInput(format!("{error:?}")))?;
     let result = replay(&table, &trace)
         .map_err(|error| Failure::BadInput(format!("the observer cannot be made: {error:?}")))?;
     if let Some(path) = &args.csv {
@@ -86,20 +87,36 @@ pub fn run(args: &ReplayArgs) -> Result<(), Failure> {
     if args.output.json {
         return output::json(&report);
     }
-    output::line(format_args!("{} samples from {}", report.samples, report.start));
+    output::line(format_args!(
+        "{} samples from {}",
+        report.samples, report.start
+    ));
     let mut rows = output::table(&["event", "value"]);
     rows.add_row(["onset", &format!("{} s", output::seconds(report.onset_s))]);
-    rows.add_row(["first response", &format!("{} s", output::seconds(report.first_response_s))]);
-    rows.add_row(["reaction after onset", &format!("{} s", output::seconds(reaction_s))]);
-    rows.add_row(["responses before the onset", &report.false_triggers.to_string()]);
-    rows.add_row(["largest participation", &format!("{:.3}", report.max_participation)]);
+    rows.add_row([
+        "first response",
+        &format!("{} s", output::seconds(report.first_response_s)),
+    ]);
+    rows.add_row([
+        "reaction after onset",
+        &format!("{} s", output::seconds(reaction_s)),
+    ]);
+    rows.add_row([
+        "responses before the onset",
+        &report.false_triggers.to_string(),
+    ]);
+    rows.add_row([
+        "largest participation",
+        &format!("{:.3}", report.max_participation),
+    ]);
     output::line(rows);
     simulate::phases(&result.phases);
     Ok(())
 }
 
 fn write_csv(path: &std::path::Path, result: &Replay) -> Result<(), Failure> {
-    let fail = |error: &dyn std::fmt::Display| Failure::BadInput(format!("{}: {error}", path.display()));
+    let fail =
+        |error: &dyn std::fmt::Display| Failure::BadInput(format!("{}: {error}", path.display()));
     let mut writer = csv::Writer::from_path(path).map_err(|e| fail(&e))?;
     let columns = ["time_s", "frequency_hz", "participation"];
     writer.write_record(columns).map_err(|e| fail(&e))?;

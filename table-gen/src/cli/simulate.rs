@@ -76,7 +76,9 @@ struct SimulateReport<'r> {
 pub fn run(args: &SimulateArgs) -> Result<(), Failure> {
     let mut set = args.spec.clone();
     if let Some(hz) = args.deadband_hz {
-        set.overrides.set.push(format!("baseline.deadband_hz={hz:?}"));
+        set.overrides
+            .set
+            .push(format!("baseline.deadband_hz={hz:?}"));
     }
     let spec = set.load()?;
     let mut scenario = Scenario::of(&spec);
@@ -94,10 +96,14 @@ pub fn run(args: &SimulateArgs) -> Result<(), Failure> {
     scenario.seed = args.seed;
     scenario.check().map_err(Failure::bad)?;
     let (controller, run) = match args.controller {
-        ControllerArg::None => (ControllerKind::None, baseline::simulate(&spec, &scenario, false)),
-        ControllerArg::Baseline => {
-            (ControllerKind::Baseline, baseline::simulate(&spec, &scenario, true))
-        }
+        ControllerArg::None => (
+            ControllerKind::None,
+            baseline::simulate(&spec, &scenario, false),
+        ),
+        ControllerArg::Baseline => (
+            ControllerKind::Baseline,
+            baseline::simulate(&spec, &scenario, true),
+        ),
         ControllerArg::Symbolic => {
             progress::catch_interrupts();
             (ControllerKind::Symbolic, symbolic(&spec, &scenario, args)?)
@@ -121,7 +127,8 @@ pub fn run(args: &SimulateArgs) -> Result<(), Failure> {
 
 fn symbolic(spec: &Spec, scenario: &Scenario, args: &SimulateArgs) -> Result<Run, Failure> {
     let bytes = pipeline::table_bytes(spec, args.table.as_deref(), &progress::watch)?;
-    let table = TableView::parse(&bytes).map_err(|error| Failure::BadInput(format!("{error:?}")))?;
+    let table =
+        TableView::parse(&bytes).map_err(|error| Failure::BadInput(format!("{error:?}")))?;
     let estimator = if args.observer {
         Estimator::Observer
     } else {
@@ -140,16 +147,36 @@ pub fn summary(summary: &Summary) {
     let mut table = output::table(&["measure", "value"]);
     let yes = |flag: bool| if flag { "yes" } else { "no" }.to_owned();
     let rows = [
-        ("nadir", format!("{:.4} Hz at {:.2} s", summary.nadir_hz, summary.nadir_time_s)),
+        (
+            "nadir",
+            format!(
+                "{:.4} Hz at {:.2} s",
+                summary.nadir_hz, summary.nadir_time_s
+            ),
+        ),
         ("final", format!("{:.4} Hz", summary.final_hz)),
-        ("largest participation", format!("{:.3}", summary.max_participation)),
-        ("below 49.5 Hz", format!("{:.2} s", summary.seconds_below_49_5)),
+        (
+            "largest participation",
+            format!("{:.3}", summary.max_participation),
+        ),
+        (
+            "below 49.5 Hz",
+            format!("{:.2} s", summary.seconds_below_49_5),
+        ),
         (
             "containment breached",
-            summary.containment_breached.map_or_else(|| "no limit stated".to_owned(), yes),
+            summary
+                .containment_breached
+                .map_or_else(|| "no limit stated".to_owned(), yes),
         ),
-        ("back in I1 after", format!("{} s", output::seconds(summary.entered_outer_s))),
-        ("back in I2 after", format!("{} s", output::seconds(summary.entered_inner_s))),
+        (
+            "back in I1 after",
+            format!("{} s", output::seconds(summary.entered_outer_s)),
+        ),
+        (
+            "back in I2 after",
+            format!("{} s", output::seconds(summary.entered_inner_s)),
+        ),
         ("stayed in I2", yes(summary.stayed_in_inner)),
     ];
     for (name, value) in rows {

@@ -75,7 +75,13 @@ impl SynthReport {
             self.inputs
         ));
         let mut table = output::table(&[
-            "game", "target cells", "winning cells", "sweeps", "worst steps", "CPU s", "wall s",
+            "game",
+            "target cells",
+            "winning cells",
+            "sweeps",
+            "worst steps",
+            "CPU s",
+            "wall s",
         ]);
         for problem in &self.problems {
             table.add_row(vec![
@@ -100,7 +106,10 @@ impl SynthReport {
 
 fn problem(name: &'static str, law: &SolvedLaw) -> ProblemReport {
     let ranks = &law.solution.ranks;
-    let worst = ranks.iter().filter(|rank| **rank != crate::game::NOT_WON).max();
+    let worst = ranks
+        .iter()
+        .filter(|rank| **rank != crate::game::NOT_WON)
+        .max();
     ProblemReport {
         name,
         target_cells: law.target_cells,
@@ -119,8 +128,7 @@ pub fn run(args: &SynthArgs) -> Result<(), Failure> {
     let synthesis = synthesis::synthesise(&spec, &progress::watch)?;
     let mut report = SynthReport::new(&spec, &synthesis);
     if args.count_transitions {
-        let abstraction =
-            synthesis::abstraction(&spec, &synthesis.grid).map_err(Failure::bad)?;
+        let abstraction = synthesis::abstraction(&spec, &synthesis.grid).map_err(Failure::bad)?;
         report.transitions = Some(synthesis::count_transitions(&abstraction));
     }
     if args.output.json {

@@ -46,10 +46,7 @@ pub fn encode(
         inputs[at..at + 2].copy_from_slice(&(count[d] as u16).to_le_bytes());
     }
     let body = &mut inputs[DENSE_HEADER_LEN..];
-    let window = GridShape {
-        count,
-        ..*shape
-    };
+    let window = GridShape { count, ..*shape };
     for position in 0..cells {
         let offset = window.cell(position);
         let index = shape.index(std::array::from_fn(|d| low[d] + offset[d]));

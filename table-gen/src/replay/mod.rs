@@ -54,8 +54,7 @@ pub struct Replay {
 pub fn replay(table: &TableView<'_>, trace: &Trace) -> Result<Replay, ObserverError> {
     let header = table.header();
     let tick_s = f64::from(header.tick_ms) / 1000.0;
-    let deviation_uhz =
-        |hz: f64| ((hz - NOMINAL_HZ) * f64::from(MICRO)).round() as i32;
+    let deviation_uhz = |hz: f64| ((hz - NOMINAL_HZ) * f64::from(MICRO)).round() as i32;
     let config = ObserverConfig::new(&header.plant, header.tick_ms)?;
     let first = trace.samples[0].frequency_hz;
     let mut observer = Observer::at_rest(config, &header.plant, deviation_uhz(first));
@@ -68,7 +67,11 @@ pub fn replay(table: &TableView<'_>, trace: &Trace) -> Result<Replay, ObserverEr
     for tick in 0..=ticks {
         let time_s = tick as f64 * tick_s;
         // Half a millisecond of grace for times that are no binary fractions.
-        while trace.samples.get(at + 1).is_some_and(|next| next.time_s <= time_s + 5e-4) {
+        while trace
+            .samples
+            .get(at + 1)
+            .is_some_and(|next| next.time_s <= time_s + 5e-4)
+        {
             at += 1;
         }
         let frequency_hz = trace.samples[at].frequency_hz;
@@ -83,7 +86,11 @@ pub fn replay(table: &TableView<'_>, trace: &Trace) -> Result<Replay, ObserverEr
     let onset_s = onset(trace);
     let responds = |sample: &&ReplaySample| sample.participation > 0.0;
     let after = |sample: &&ReplaySample| onset_s.is_some_and(|onset| sample.time_s >= onset);
-    let first_response_s = samples.iter().filter(after).find(responds).map(|s| s.time_s);
+    let first_response_s = samples
+        .iter()
+        .filter(after)
+        .find(responds)
+        .map(|s| s.time_s);
     let false_triggers = samples
         .windows(2)
         .filter(|pair| pair[0].participation == 0.0 && pair[1].participation > 0.0)
@@ -107,7 +114,9 @@ fn onset(trace: &Trace) -> Option<f64> {
         let window = samples[index + 1..]
             .iter()
             .take_while(|to| to.time_s <= from.time_s + ONSET_WITHIN_S);
-        let lowest = window.map(|to| to.frequency_hz).fold(f64::INFINITY, f64::min);
+        let lowest = window
+            .map(|to| to.frequency_hz)
+            .fold(f64::INFINITY, f64::min);
         let falls_next = samples
             .get(index + 1)
             .is_some_and(|next| next.frequency_hz < from.frequency_hz);

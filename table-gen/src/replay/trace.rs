@@ -84,7 +84,10 @@ fn parse(bytes: &[u8], fill_gaps_s: Option<f64>) -> Result<Trace, RowError> {
         Err(error) => return Err((header_line(&reader), error.to_string())),
     };
     let known = [["dtm", "f"], ["utc_time", "frequency_hz"]];
-    if !known.iter().any(|names| header.iter().eq(names.iter().copied())) {
+    if !known
+        .iter()
+        .any(|names| header.iter().eq(names.iter().copied()))
+    {
         let found: Vec<&str> = header.iter().collect();
         let line = header_line(&reader);
         let reason = format!(
@@ -103,21 +106,31 @@ fn parse(bytes: &[u8], fill_gaps_s: Option<f64>) -> Result<Trace, RowError> {
         let line = record.position().map_or(0, csv::Position::line);
         let field = |index: usize| record.get(index).unwrap_or("");
         let time = time_stamp(field(0)).ok_or_else(|| {
-            let reason = format!("time {:?}; allowed: 2019-08-09T15:52:33Z or 2019-08-09 15:52:33", field(0));
+            let reason = format!(
+                "time {:?}; allowed: 2019-08-09T15:52:33Z or 2019-08-09 15:52:33",
+                field(0)
+            );
             (line, reason)
         })?;
         let frequency_hz: f64 = field(1)
             .parse()
             .map_err(|_| (line, format!("frequency {:?} is not a number", field(1))))?;
         if !PLAUSIBLE_HZ.contains(&frequency_hz) {
-            return Err((line, format!("frequency {frequency_hz} Hz; allowed: 40 to 60 Hz")));
+            return Err((
+                line,
+                format!("frequency {frequency_hz} Hz; allowed: 40 to 60 Hz"),
+            ));
         }
         let zero = start.get_or_insert_with(|| (field(0).to_owned(), time)).1;
         let time_s = time.duration_since(zero).as_secs_f64();
         if let Some((_, last, _)) = rows.last()
             && time_s <= *last
         {
-            let word = if time_s == *last { "duplicate" } else { "decreasing" };
+            let word = if time_s == *last {
+                "duplicate"
+            } else {
+                "decreasing"
+            };
             return Err((line, format!("{word} time {:?}; times must rise", field(0))));
         }
         if rows.len() == SAMPLES_MAX {
@@ -165,7 +178,9 @@ fn fill(
                         return Err((*line, reason));
                     }
                     Some(longest) if gap > longest => {
-                        let reason = format!("gap of {gap} s before this row; --fill-gaps allows {longest} s");
+                        let reason = format!(
+                            "gap of {gap} s before this row; --fill-gaps allows {longest} s"
+                        );
                         return Err((*line, reason));
                     }
                     Some(_) => {}
@@ -197,10 +212,24 @@ mod tests {
 
     #[test]
     fn both_formats_are_read() {
-        let iso = text("# c\nutc_time,frequency_hz\n2019-08-09T15:51:00Z,50.013\n2019-08-09T15:51:01Z,50.0\n", None).unwrap();
+        let iso = text(
+            "# c\nutc_time,frequency_hz\n2019-08-09T15:51:00Z,50.013\n2019-08-09T15:51:01Z,50.0\n",
+            None,
+        )
+        .unwrap();
         assert_eq!(iso.samples[1].time_s, 1.0);
-        let raw = text("dtm,f\n2019-08-09 23:59:59,49.99\n2019-08-10 00:00:00,49.98\n", None).unwrap();
-        assert_eq!(raw.samples[1], TraceSample { time_s: 1.0, frequency_hz: 49.98 });
+        let raw = text(
+            "dtm,f\n2019-08-09 23:59:59,49.99\n2019-08-10 00:00:00,49.98\n",
+            None,
+        )
+        .unwrap();
+        assert_eq!(
+            raw.samples[1],
+            TraceSample {
+                time_s: 1.0,
+                frequency_hz: 49.98
+            }
+        );
         assert_eq!(raw.start, "2019-08-09 23:59:59");
     }
 
@@ -220,15 +249,24 @@ mod tests {
         ] {
             let (found, reason) = text(&format!("{head}{row}"), None).unwrap_err();
             assert!(reason.contains(word), "{row:?}: {reason}");
-            assert!(found == line || word == "fewer than two", "{row:?}: line {found}");
+            assert!(
+                found == line || word == "fewer than two",
+                "{row:?}: line {found}"
+            );
         }
-        assert!(text("a,b\n1,2\n", None).unwrap_err().1.contains("allowed: dtm,f"));
+        assert!(
+            text("a,b\n1,2\n", None)
+                .unwrap_err()
+                .1
+                .contains("allowed: dtm,f")
+        );
         assert!(text("", None).is_err());
     }
 
     #[test]
     fn gaps_are_errors_or_filled() {
-        let body = "dtm,f\n2019-08-09 00:00:00,50\n2019-08-09 00:00:01,49.9\n2019-08-09 00:00:04,49.8\n";
+        let body =
+            "dtm,f\n2019-08-09 00:00:00,50\n2019-08-09 00:00:01,49.9\n2019-08-09 00:00:04,49.8\n";
         let (line, reason) = text(body, None).unwrap_err();
         assert_eq!(line, 4);
         assert!(reason.contains("gap of 3 s"), "{reason}");

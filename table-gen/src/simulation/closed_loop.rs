@@ -133,9 +133,14 @@ pub fn simulate(
         }
         extend_phases(&mut phases, action.phase, time_s, time_s + tick_s);
         let mut at = time_s;
-        let parts = [(&steps.early, older, steps.early_s), (&steps.late, newer, tick_s - steps.early_s)];
+        let parts = [
+            (&steps.early, older, steps.early_s),
+            (&steps.late, newer, tick_s - steps.early_s),
+        ];
         for (propagator, u, length_s) in parts {
-            let Some(propagator) = propagator else { continue };
+            let Some(propagator) = propagator else {
+                continue;
+            };
             let power = net(delivered(u));
             // The slope jumps with the power: each part starts with a knot of its own.
             monitor.knot(knot(&plant, at, &x, power));

@@ -129,8 +129,7 @@ impl BandWatch {
         let clear = |f: f64| self.inside(f);
         let extremes = segment.extremes();
         let turns = extremes.into_iter().flatten().map(|s| segment.at(s));
-        let all_inside =
-            clear(segment.from.f) && clear(segment.to.f) && turns.clone().all(clear);
+        let all_inside = clear(segment.from.f) && clear(segment.to.f) && turns.clone().all(clear);
         if all_inside && (!self.left || self.entered_s.is_some()) {
             return;
         }

@@ -69,14 +69,32 @@ impl Scenario {
         };
         within("--loss-gw", self.loss_gw, -100.0, 100.0, "-100 to 100 GW")?;
         if self.duration_s <= 0.0 {
-            within("--duration-s", self.duration_s, f64::MIN_POSITIVE, 1.0, "above 0 to 86400 s")?;
+            within(
+                "--duration-s",
+                self.duration_s,
+                f64::MIN_POSITIVE,
+                1.0,
+                "above 0 to 86400 s",
+            )?;
         }
-        within("--duration-s", self.duration_s, 0.0, DURATION_S_MAX, "above 0 to 86400 s")?;
+        within(
+            "--duration-s",
+            self.duration_s,
+            0.0,
+            DURATION_S_MAX,
+            "above 0 to 86400 s",
+        )?;
         let share = self.participation_error;
         within("--participation-error", share, 0.0, 1.0, "0 to 1")?;
         within("--delay-s", self.delay_s, 0.0, 60.0, "0 to 60 s")?;
         for value in self.initial {
-            within("uncertainty.initial", value, -2000.0, 2000.0, "finite, within 2000")?;
+            within(
+                "uncertainty.initial",
+                value,
+                -2000.0,
+                2000.0,
+                "finite, within 2000",
+            )?;
         }
         Ok(())
     }
