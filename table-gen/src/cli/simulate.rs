@@ -27,7 +27,7 @@ enum ControllerArg {
 
 /// Arguments of `simulate`.
 #[derive(Debug, clap::Args)]
-pub struct SimulateArgs {
+pub(super) struct SimulateArgs {
     #[command(flatten)]
     spec: SpecArgs,
     #[command(flatten)]
@@ -73,7 +73,7 @@ struct SimulateReport<'r> {
 }
 
 /// Runs the command.
-pub fn run(args: &SimulateArgs) -> Result<(), Failure> {
+pub(super) fn run(args: &SimulateArgs) -> Result<(), Failure> {
     let mut set = args.spec.clone();
     if let Some(hz) = args.deadband_hz {
         set.overrides
@@ -143,7 +143,7 @@ fn print(report: &SimulateReport<'_>, run: &Run) {
 }
 
 /// A summary as a table on stdout.
-pub fn summary(summary: &Summary) {
+pub(super) fn summary(summary: &Summary) {
     let mut table = output::table(&["measure", "value"]);
     let yes = |flag: bool| if flag { "yes" } else { "no" }.to_owned();
     let rows = [
@@ -186,7 +186,7 @@ pub fn summary(summary: &Summary) {
 }
 
 /// Phases as a table on stdout.
-pub fn phases(phases: &[PhaseSpan]) {
+pub(super) fn phases(phases: &[PhaseSpan]) {
     if phases.is_empty() {
         return;
     }
