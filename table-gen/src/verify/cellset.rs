@@ -122,7 +122,10 @@ mod tests {
         let before = new.len();
         set.insert_box(&cells, &mut new);
         assert_eq!(new.len(), before);
-        let wider = Cells { low: [59, 1, 0, 1], ..cells };
+        let wider = Cells {
+            low: [59, 1, 0, 1],
+            ..cells
+        };
         assert_eq!(set.missing(&wider), Some(59 + 70 + 70 * 3 * 2));
         assert!(set.contains(60 + 70 + 420) && !set.contains(0));
     }

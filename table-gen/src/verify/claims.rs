@@ -23,8 +23,16 @@ impl Findings<'_> {
         let mut claims = vec![
             self.header(),
             self.containment(),
-            self.reach("reach-outer", self.tally.periods_c1, "outside I1, f is back in I1"),
-            self.reach("reach-inner", self.tally.periods_c2, "in I1 and outside I2, f is in I2"),
+            self.reach(
+                "reach-outer",
+                self.tally.periods_c1,
+                "outside I1, f is back in I1",
+            ),
+            self.reach(
+                "reach-inner",
+                self.tally.periods_c2,
+                "in I1 and outside I2, f is in I2",
+            ),
             self.settle(),
         ];
         if self.spec.requirements.stay {
@@ -36,7 +44,9 @@ impl Findings<'_> {
 
     /// Why a claim that rests on these violations does not hold.
     fn reason(&self, kinds: &[Violation]) -> Option<String> {
-        let found = kinds.iter().find_map(|kind| self.tally.violations.get(kind));
+        let found = kinds
+            .iter()
+            .find_map(|kind| self.tally.violations.get(kind));
         found
             .map(|found| found.what.clone())
             .or_else(|| self.tally.limit.clone())
@@ -60,7 +70,10 @@ impl Findings<'_> {
         let limit = self.spec.requirements.containment_hz;
         let bound = self.tally.lowest.map(|f| f / 1e6);
         let statement = match limit {
-            Some(limit) => format!("f >= {limit} Hz at all times{}, between samples too", self.scope),
+            Some(limit) => format!(
+                "f >= {limit} Hz at all times{}, between samples too",
+                self.scope
+            ),
             None => format!("f has a lower bound{}, between samples too", self.scope),
         };
         Claim {
@@ -90,17 +103,24 @@ impl Findings<'_> {
     fn settle(&self) -> Claim {
         let limit = self.spec.requirements.settle_within_s;
         let bound = f64::from(self.tally.settle_ticks) * self.model.tick_s;
-        let reason = self.reason(&[Violation::Late, Violation::Uncovered]).or_else(|| {
-            (bound > limit).then(|| format!("it may take {bound:.1} s"))
-        });
-        let target = if self.spec.requirements.stay { "I2 for good" } else { "I2" };
+        let reason = self
+            .reason(&[Violation::Late, Violation::Uncovered])
+            .or_else(|| (bound > limit).then(|| format!("it may take {bound:.1} s")));
+        let target = if self.spec.requirements.stay {
+            "I2 for good"
+        } else {
+            "I2"
+        };
         Claim {
             name: "settle",
             holds: reason.is_none(),
             bound: Some(bound),
             limit: Some(limit),
             unit: "s",
-            statement: format!("after leaving I1, f is in {target} within {limit} s{}", self.scope),
+            statement: format!(
+                "after leaving I1, f is in {target} within {limit} s{}",
+                self.scope
+            ),
             reason,
         }
     }
@@ -123,7 +143,14 @@ impl Findings<'_> {
 
     fn table_claim(&self) -> Claim {
         let reason = self.reason(&[Violation::Uncovered, Violation::Visits]);
-        let limit = self.table.header().laws.iter().flatten().map(|law| law.worst_visits).max();
+        let limit = self
+            .table
+            .header()
+            .laws
+            .iter()
+            .flatten()
+            .map(|law| law.worst_visits)
+            .max();
         Claim {
             name: "table",
             holds: reason.is_none(),

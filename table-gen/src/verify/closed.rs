@@ -111,7 +111,10 @@ impl Closed<'_> {
         if let Some((cell, _)) = graph.hold_leaves_hold() {
             let what = "Hold leads to a cell that Hold does not cover".to_owned();
             let path = self.path(layers, cell, seed_path);
-            tally.violations.entry(Violation::Left).or_insert(Found { what, path });
+            tally
+                .violations
+                .entry(Violation::Left)
+                .or_insert(Found { what, path });
         }
         match graph.longest() {
             Ok(longest) => {
@@ -122,7 +125,10 @@ impl Closed<'_> {
             Err(cell) => {
                 let what = "C1 and C2 can go round in cells without ever reaching Hold".to_owned();
                 let path = self.path(layers, cell, seed_path);
-                tally.violations.entry(Violation::Late).or_insert(Found { what, path });
+                tally
+                    .violations
+                    .entry(Violation::Late)
+                    .or_insert(Found { what, path });
             }
         }
     }
@@ -196,7 +202,11 @@ impl Closed<'_> {
     ) {
         let range = self.model.period.frequency(real, drive);
         batch.range = Some(batch.range.map_or(range, |all| all.join(range)));
-        if self.model.containment.is_some_and(|limit| range.low < limit) {
+        if self
+            .model
+            .containment
+            .is_some_and(|limit| range.low < limit)
+        {
             let what = format!("f may fall to {:.4} Hz", range.low / 1e6);
             batch.violations.push((Violation::Containment, index, what));
         }
@@ -238,7 +248,10 @@ impl Closed<'_> {
         let grid = &self.table.header().grid;
         let mut at = cell;
         let mut back = vec![cell];
-        let Some(depth) = layers.iter().position(|layer| layer.binary_search(&cell).is_ok()) else {
+        let Some(depth) = layers
+            .iter()
+            .position(|layer| layer.binary_search(&cell).is_ok())
+        else {
             return Vec::new();
         };
         for layer in layers[..depth].iter().rev() {
@@ -246,7 +259,9 @@ impl Closed<'_> {
             let before = layer.par_chunks(TASK_CELLS).find_map_first(|cells| {
                 let batch = self.expand(cells, &nowhere);
                 let to = cell_at(grid.count(), at).0;
-                let hit = |edge: &&Edge| (0..STATES).all(|d| edge.to.low[d] <= to[d] && to[d] <= edge.to.high[d]);
+                let hit = |edge: &&Edge| {
+                    (0..STATES).all(|d| edge.to.low[d] <= to[d] && to[d] <= edge.to.high[d])
+                };
                 batch.edges.iter().find(hit).map(|edge| edge.from)
             });
             let Some(before) = before else { break };
@@ -303,4 +318,3 @@ pub(super) fn cell_at(count: [u16; STATES], mut index: u32) -> firmware::grid::C
     }
     firmware::grid::Cell(cell)
 }
-

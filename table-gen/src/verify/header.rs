@@ -28,9 +28,17 @@ pub(super) fn differences(header: &Header, spec: &Spec) -> Vec<String> {
         format!("{:?}", grid.width()),
         format!("{:?}", spec.grid.widths_micro()),
     );
-    same("the grid's cells", format!("{:?}", grid.count()), format!("{counts:?}"));
+    same(
+        "the grid's cells",
+        format!("{:?}", grid.count()),
+        format!("{counts:?}"),
+    );
     let levels = spec.input.levels();
-    same("the number of inputs", header.levels.to_string(), levels.to_string());
+    same(
+        "the number of inputs",
+        header.levels.to_string(),
+        levels.to_string(),
+    );
     let last = header.levels.saturating_sub(1);
     same(
         "the last input [ppm]",
@@ -41,13 +49,33 @@ pub(super) fn differences(header: &Header, spec: &Spec) -> Vec<String> {
     let step = (spec.input.step * 1e6).round() as i64;
     let close = (i64::from(header.input_step_ppm) - step).abs() <= 1;
     same("the input step fits", close.to_string(), true.to_string());
-    same("the tick [ms]", header.tick_ms.to_string(), spec.sampling.watch_ms().to_string());
+    same(
+        "the tick [ms]",
+        header.tick_ms.to_string(),
+        spec.sampling.watch_ms().to_string(),
+    );
     let ticks = spec.sampling.ticks_per_period();
-    same("ticks a period", header.period_ticks.to_string(), ticks.to_string());
+    same(
+        "ticks a period",
+        header.period_ticks.to_string(),
+        ticks.to_string(),
+    );
     let band = |band: &firmware::units::Band| format!("{:?}", [band.low_uhz, band.high_uhz]);
     let requirements = &spec.requirements;
-    same("I1 [µHz]", band(&header.outer), format!("{:?}", requirements.outer_micro()));
-    same("I2 [µHz]", band(&header.inner), format!("{:?}", requirements.inner_micro()));
-    same("stay", header.stay.to_string(), requirements.stay.to_string());
+    same(
+        "I1 [µHz]",
+        band(&header.outer),
+        format!("{:?}", requirements.outer_micro()),
+    );
+    same(
+        "I2 [µHz]",
+        band(&header.inner),
+        format!("{:?}", requirements.inner_micro()),
+    );
+    same(
+        "stay",
+        header.stay.to_string(),
+        requirements.stay.to_string(),
+    );
     out
 }

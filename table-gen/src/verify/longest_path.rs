@@ -130,7 +130,9 @@ impl<'g> Graph<'g> {
 
     /// Whether some cell has more than one edge; edges of a cell are neighbours.
     fn has_astride(&self) -> bool {
-        self.edges.windows(2).any(|pair| pair[0].from == pair[1].from)
+        self.edges
+            .windows(2)
+            .any(|pair| pair[0].from == pair[1].from)
     }
 }
 

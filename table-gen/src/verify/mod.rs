@@ -151,7 +151,8 @@ pub fn verify(
         scope,
     }
     .claims();
-    let ticks = (spec.requirements.horizon_s.unwrap_or(OPEN_HORIZON_S) / model.tick_s).ceil() as u32;
+    let ticks =
+        (spec.requirements.horizon_s.unwrap_or(OPEN_HORIZON_S) / model.tick_s).ceil() as u32;
     let replay = Replay::new(&table, &model, [inner.low, inner.high], settle_ticks);
     Ok(Verdict {
         verified: claims.iter().all(|claim| claim.holds),
@@ -214,7 +215,11 @@ fn counterexample(
         let shown = Counterexample {
             claim,
             what: found.what.clone(),
-            path: found.path.iter().map(|step| step.shown(model.tick_s)).collect(),
+            path: found
+                .path
+                .iter()
+                .map(|step| step.shown(model.tick_s))
+                .collect(),
             real,
         };
         if shown.real.is_some() {

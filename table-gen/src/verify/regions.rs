@@ -60,12 +60,13 @@ impl Regions {
         }
     }
 
-    /// The parts of a set by the band that a watching phase examines: below, inside and above it. On the other axes the
+    /// The parts of a set by the band that a watching phase examines. On the other axes the
     /// representatives lie within the set's bounds.
     pub(super) fn by_band(&self, set: &Zonotope, phase: Phase) -> Vec<Part> {
         let band = match phase {
-            Phase::NoControl => &self.outer,
-            _ => &self.inner,
+            // No control ends below I1 alone: one edge, so that the sets that stay are not cut in two.
+            Phase::NoControl => &self.outer[..1],
+            _ => &self.inner[..],
         };
         let mut representative = [0i32; STATES];
         for (axis, value) in representative.iter_mut().enumerate() {
@@ -94,7 +95,11 @@ impl Regions {
     pub(super) fn within(&self, bounds: &[(i32, i32); STATES]) -> Vec<(State, Interval)> {
         let (low, high) = bounds[AXIS_F];
         let mut starts = vec![low];
-        starts.extend(self.bands.iter().filter(|edge| low < **edge && **edge < high));
+        starts.extend(
+            self.bands
+                .iter()
+                .filter(|edge| low < **edge && **edge < high),
+        );
         let error = self.error[AXIS_F];
         let mut out = Vec::with_capacity(starts.len());
         for (i, start) in starts.iter().enumerate() {
@@ -149,9 +154,20 @@ mod tests {
 
     #[test]
     fn a_set_astride_an_edge_has_two_parts() {
-        let axis = Interval { low: -2.0, high: 3.0 };
+        let axis = Interval {
+            low: -2.0,
+            high: 3.0,
+        };
         let set = Zonotope::of_box(&[axis, axis, axis, axis]);
-        let parts = cut(&[-10, 0, 10], 0, 0.0, vec![Part { representative: State::default(), set }]);
+        let parts = cut(
+            &[-10, 0, 10],
+            0,
+            0.0,
+            vec![Part {
+                representative: State::default(),
+                set,
+            }],
+        );
         assert_eq!(parts.len(), 2);
         assert_eq!(parts[0].representative.0[0], -10);
         assert_eq!(parts[1].representative.0[0], 0);
@@ -160,9 +176,20 @@ mod tests {
 
     #[test]
     fn an_error_makes_the_parts_overlap() {
-        let axis = Interval { low: -2.0, high: 3.0 };
+        let axis = Interval {
+            low: -2.0,
+            high: 3.0,
+        };
         let set = Zonotope::of_box(&[axis, axis, axis, axis]);
-        let parts = cut(&[0], 0, 1.0, vec![Part { representative: State::default(), set }]);
+        let parts = cut(
+            &[0],
+            0,
+            1.0,
+            vec![Part {
+                representative: State::default(),
+                set,
+            }],
+        );
         assert!((parts[0].set.bounds(0).high - 1.0).abs() < 1e-6);
         assert!((parts[1].set.bounds(0).low + 1.0).abs() < 1e-6);
         assert_eq!(parts[0].representative.0[0], -1);

@@ -106,7 +106,8 @@ impl<'a> Replay<'a> {
         for tick in 0..ticks {
             let time_s = offset_s + f64::from(tick) * self.model.tick_s;
             let (share, error) = adversary.tick(&x, state);
-            let measured = std::array::from_fn(|d| (x[d] + error[d] * self.model.error[d]).floor() as i32);
+            let measured =
+                std::array::from_fn(|d| (x[d] + error[d] * self.model.error[d]).floor() as i32);
             let (next, step) = state.step(self.table, State(measured));
             state = next;
             see(&Sample {
@@ -141,7 +142,11 @@ impl<'a> Replay<'a> {
     }
 
     fn broken(&self, phase: Phase, f: f64) -> Option<Violation> {
-        if self.model.containment.is_some_and(|limit| f < limit - MARGIN_UHZ) {
+        if self
+            .model
+            .containment
+            .is_some_and(|limit| f < limit - MARGIN_UHZ)
+        {
             return Some(Violation::Containment);
         }
         let outside = f < self.inner[0] - MARGIN_UHZ || f > self.inner[1] + MARGIN_UHZ;

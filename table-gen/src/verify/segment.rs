@@ -182,7 +182,10 @@ mod tests {
         let segment = Segment::new(&a, &b, 1.0);
         let mut set = [Interval::ZERO; STATES];
         set[0] = Interval::point(2.0);
-        let still = Drive { mid: 0.0, radius: 0.0 };
+        let still = Drive {
+            mid: 0.0,
+            radius: 0.0,
+        };
         let range = segment.frequency(&set, still);
         // From 2 down to 2/e; the excess of a chord is at most h²/8 · 2 = 2.5e-5.
         assert!(range.high >= 2.0 && range.high < 2.0 + 3e-5);
@@ -195,10 +198,19 @@ mod tests {
         let (a, b) = decay();
         let segment = Segment::new(&a, &b, 1.0);
         let set = [Interval::ZERO; STATES];
-        let range = segment.frequency(&set, Drive { mid: 0.0, radius: 3.0 });
+        let range = segment.frequency(
+            &set,
+            Drive {
+                mid: 0.0,
+                radius: 3.0,
+            },
+        );
         // 3 (1 - 1/e); the last step's line exceeds a by at most h²/2.
         let reach = 3.0 * (1.0 - (-1.0f64).exp());
-        assert!(range.high >= reach && range.high < reach + 3.0 * 1e-4, "{range:?}");
+        assert!(
+            range.high >= reach && range.high < reach + 3.0 * 1e-4,
+            "{range:?}"
+        );
         assert!(range.low <= -reach && range.low > -reach - 3.0 * 1e-4);
     }
 }

@@ -85,7 +85,13 @@ impl Tally {
     }
 
     /// Notes a decision at a cell: every law that the phase machine may have asked is checked.
-    pub(super) fn looked_up(&mut self, table: &TableView<'_>, cell: Cell, trace: u32, traces: &Traces) {
+    pub(super) fn looked_up(
+        &mut self,
+        table: &TableView<'_>,
+        cell: Cell,
+        trace: u32,
+        traces: &Traces,
+    ) {
         self.lookups += 1;
         let (worst, exceeded) = visits(table, cell);
         self.worst_visits = self.worst_visits.max(worst);

@@ -97,7 +97,11 @@ impl<'a> Timed<'a> {
     }
 
     /// Explores every tick up to the horizon; `go_on` is asked after each layer.
-    pub(super) fn run(mut self, horizon_ticks: u32, go_on: &dyn Fn(f64) -> bool) -> Option<Explored> {
+    pub(super) fn run(
+        mut self,
+        horizon_ticks: u32,
+        go_on: &dyn Fn(f64) -> bool,
+    ) -> Option<Explored> {
         self.begin();
         let mut open_ticks = 0;
         while let Some((tick, nodes)) = self.layers.pop_first() {
@@ -206,12 +210,14 @@ impl<'a> Timed<'a> {
         let trace = self.traces.push(Some(one.trace), at);
         let Step::Level(level) = one.step else {
             let what = "no law has an entry for the state";
-            self.tally.violate(Violation::Uncovered, what, trace, &self.traces);
+            self.tally
+                .violate(Violation::Uncovered, what, trace, &self.traces);
             return;
         };
         let Some(drive) = self.model.drives.get(usize::from(level)).copied() else {
             let what = "an entry names a level that does not exist";
-            self.tally.violate(Violation::Uncovered, what, trace, &self.traces);
+            self.tally
+                .violate(Violation::Uncovered, what, trace, &self.traces);
             return;
         };
         if one.next != one.was
@@ -266,7 +272,8 @@ impl<'a> Timed<'a> {
             self.tally.settle_ticks = self.tally.settle_ticks.max(ran);
             if ran > self.settle_ticks {
                 let what = "I2 is not reached in time";
-                self.tally.violate(Violation::Late, what, trace, &self.traces);
+                self.tally
+                    .violate(Violation::Late, what, trace, &self.traces);
             }
         }
         age

@@ -43,9 +43,19 @@ pub(super) fn find(
             share: 1.0,
         };
         let resonant = || Resonant::new(seed);
-        attempt(replay, model, kind, ticks, &constant, || format!("constant extremes, number {seed}"))
-            .or_else(|| attempt(replay, model, kind, ticks, &bang, || format!("random extremes, seed {seed}")))
-            .or_else(|| attempt(replay, model, kind, ticks, &resonant, || format!("resonant extremes, seed {seed}")))
+        attempt(replay, model, kind, ticks, &constant, || {
+            format!("constant extremes, number {seed}")
+        })
+        .or_else(|| {
+            attempt(replay, model, kind, ticks, &bang, || {
+                format!("random extremes, seed {seed}")
+            })
+        })
+        .or_else(|| {
+            attempt(replay, model, kind, ticks, &resonant, || {
+                format!("resonant extremes, seed {seed}")
+            })
+        })
     })
 }
 
@@ -105,7 +115,11 @@ fn real_path(model: &Model, breach: Breach, samples: &[Sample], adversary: Strin
         breach_s: breach.time_s,
         first_tick_s: samples.get(1).map_or(0.0, |sample| sample.time_s),
         initial: samples.first().map_or([0.0; 4], |s| s.x.map(|v| v / 1e6)),
-        adversary: if model.is_exact() { "none".to_owned() } else { adversary },
+        adversary: if model.is_exact() {
+            "none".to_owned()
+        } else {
+            adversary
+        },
         points,
     }
 }

@@ -56,7 +56,13 @@ impl Zonotope {
         let mut out = Self {
             centre: axes.map(Interval::mid),
             generators: Vec::new(),
-            slack: axes.map(|axis| if axis.low == axis.high { 0.0 } else { axis.radius() }),
+            slack: axes.map(|axis| {
+                if axis.low == axis.high {
+                    0.0
+                } else {
+                    axis.radius()
+                }
+            }),
         };
         out.tidy();
         out
@@ -72,7 +78,10 @@ impl Zonotope {
         };
         let mut chord = [0.0; STATES];
         for d in 0..STATES {
-            let (a, b) = (Interval::point(start.centre[d]), Interval::point(end.centre[d]));
+            let (a, b) = (
+                Interval::point(start.centre[d]),
+                Interval::point(end.centre[d]),
+            );
             let half = Interval::point(0.5);
             out.centre[d] = keep((a + b) * half, &mut out.slack[d]);
             chord[d] = keep((b - a) * half, &mut out.slack[d]);
@@ -167,7 +176,13 @@ impl Zonotope {
         if low <= bounds.low && bounds.high <= high {
             return Some(self.clone());
         }
-        let mut alpha = vec![Interval { low: -1.0, high: 1.0 }; self.generators.len()];
+        let mut alpha = vec![
+            Interval {
+                low: -1.0,
+                high: 1.0
+            };
+            self.generators.len()
+        ];
         let fixed = Interval::point(self.centre[axis]) + symmetric(self.slack[axis]);
         let target = Interval { low, high };
         for _ in 0..ROUNDS_MAX {
@@ -275,7 +290,10 @@ mod tests {
     use super::*;
 
     fn square() -> Zonotope {
-        let unit = Interval { low: -1.0, high: 1.0 };
+        let unit = Interval {
+            low: -1.0,
+            high: 1.0,
+        };
         Zonotope::of_box(&[unit, unit, Interval::ZERO, Interval::ZERO])
     }
 
@@ -299,7 +317,9 @@ mod tests {
             slack: [0.0; STATES],
         };
         let cut = line.cut(0, 0.5, 9.0).unwrap();
-        assert!((cut.bounds(1).low - 1.0).abs() < 1e-14 && (cut.bounds(1).high - 2.0).abs() < 1e-14);
+        assert!(
+            (cut.bounds(1).low - 1.0).abs() < 1e-14 && (cut.bounds(1).high - 2.0).abs() < 1e-14
+        );
     }
 
     #[test]
