@@ -1,8 +1,9 @@
-//! Tight sets of states: a zonotope with a box of slack, `{ c + G α + β : |α_j| <= 1, |β_i| <= slack_i }`.
+//! Tight sets of states: a zonotope with a box of slack, `{ c + G α + β : |α_j| <= 1, |β_i| <= slack_i }`, cut by a box.
 //!
 //! Linear flows map a zonotope to a zonotope exactly; what floating point loses goes into the slack. Cutting by
 //! `low <= x_i <= high` shrinks the intervals of the coefficients α (a sound over-approximation of the cut, exact for
-//! a single generator, which is what the unknown moment of the event gives).
+//! a single generator, which is what the unknown moment of the event gives). With several generators each can make up
+//! for another and little shrinks; the box remembers the cut, and one step later it still bounds what matters.
 
 use super::model::Drive;
 use super::segment::{Linear, Segment};
@@ -23,7 +24,14 @@ pub(super) struct Zonotope {
     centre: [f64; STATES],
     generators: Vec<[f64; STATES]>,
     slack: [f64; STATES],
+    limits: [Interval; STATES],
 }
+
+/// No limit.
+const WHOLE: Interval = Interval {
+    low: f64::NEG_INFINITY,
+    high: f64::INFINITY,
+};
 
 impl Linear for Zonotope {
     fn range(&self, row: &Vector<STATES>) -> Interval {
@@ -42,7 +50,7 @@ impl Linear for Zonotope {
         for d in 0..STATES {
             radius = (radius + (row[d].magnitude() * self.slack[d]).next_up()).next_up();
         }
-        sum + symmetric(radius)
+        meet(sum + symmetric(radius), self.hull().range(row))
     }
 
     fn magnitude(&self) -> [f64; STATES] {
@@ -63,6 +71,7 @@ impl Zonotope {
                     axis.radius()
                 }
             }),
+            limits: *axes,
         };
         out.tidy();
         out
@@ -75,6 +84,7 @@ impl Zonotope {
             centre: [0.0; STATES],
             generators: Vec::with_capacity(start.generators.len() + 1),
             slack: [0.0; STATES],
+            limits: [WHOLE; STATES],
         };
         let mut chord = [0.0; STATES];
         for d in 0..STATES {
@@ -112,8 +122,13 @@ impl Zonotope {
             centre: [0.0; STATES],
             generators: Vec::with_capacity(self.generators.len() + STATES),
             slack: [0.0; STATES],
+            limits: [WHOLE; STATES],
         };
+        let hull = self.hull();
         for d in 0..STATES {
+            let varied = symmetric((segment.absolute[d] * drive.radius).next_up());
+            let driven = segment.flow.gamma[d] * Interval::point(drive.mid);
+            out.limits[d] = hull.range(&phi[d]) + driven + varied;
             let mut centre = segment.flow.gamma[d] * Interval::point(drive.mid);
             let mut slack = (segment.absolute[d] * drive.radius).next_up();
             for j in 0..STATES {
@@ -146,7 +161,10 @@ impl Zonotope {
 
     /// Interval of an axis.
     pub(super) fn bounds(&self, axis: usize) -> Interval {
-        Interval::point(self.centre[axis]) + symmetric(self.radius(axis))
+        meet(
+            Interval::point(self.centre[axis]) + symmetric(self.radius(axis)),
+            self.limits[axis],
+        )
     }
 
     /// The box around the set.
@@ -184,7 +202,7 @@ impl Zonotope {
             self.generators.len()
         ];
         let fixed = Interval::point(self.centre[axis]) + symmetric(self.slack[axis]);
-        let target = Interval { low, high };
+        let target = meet(Interval { low, high }, self.limits[axis]);
         for _ in 0..ROUNDS_MAX {
             let mut changed = false;
             for j in 0..self.generators.len() {
@@ -213,7 +231,13 @@ impl Zonotope {
                 break;
             }
         }
-        Some(self.with_coefficients(&alpha))
+        let mut out = self.with_coefficients(&alpha);
+        out.limits[axis] = target;
+        let empty = |axis| {
+            let bounds: Interval = out.bounds(axis);
+            bounds.low > bounds.high
+        };
+        (!(0..STATES).any(empty)).then_some(out)
     }
 
     fn with_coefficients(&self, alpha: &[Interval]) -> Self {
@@ -221,6 +245,7 @@ impl Zonotope {
             centre: [0.0; STATES],
             generators: vec![[0.0; STATES]; self.generators.len()],
             slack: self.slack,
+            limits: self.limits,
         };
         let mut centre = self.centre.map(Interval::point);
         for (j, generator) in self.generators.iter().enumerate() {
@@ -278,6 +303,14 @@ fn keep(value: Interval, slack: &mut f64) -> f64 {
     mid
 }
 
+/// The members of both; if there are none, the ends cross.
+fn meet(a: Interval, b: Interval) -> Interval {
+    Interval {
+        low: a.low.max(b.low),
+        high: a.high.min(b.high),
+    }
+}
+
 fn symmetric(radius: f64) -> Interval {
     Interval {
         low: -radius,
@@ -315,6 +348,7 @@ mod tests {
             centre: [0.0; STATES],
             generators: vec![[1.0, 2.0, 0.0, 0.0]],
             slack: [0.0; STATES],
+            limits: [WHOLE; STATES],
         };
         let cut = line.cut(0, 0.5, 9.0).unwrap();
         assert!(
