@@ -10,6 +10,7 @@ use firmware::units::{AXIS_F, State};
 use super::model::Model;
 use super::tally::Violation;
 use crate::flow::Flow;
+use crate::interval::Interval;
 use crate::plant::STATES;
 
 /// Pieces of a tick at which the frequency between ticks is looked at.
@@ -163,8 +164,8 @@ impl<'a> Replay<'a> {
 
 fn plain(flow: &Flow<STATES>) -> ([[f64; STATES]; STATES], [f64; STATES]) {
     (
-        flow.phi.map(|row| row.map(|entry| entry.mid())),
-        flow.gamma.map(|entry| entry.mid()),
+        flow.phi.map(|row| row.map(Interval::mid)),
+        flow.gamma.map(Interval::mid),
     )
 }
 
