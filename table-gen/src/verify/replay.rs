@@ -8,7 +8,7 @@ use firmware::table::TableView;
 use firmware::units::{AXIS_F, State};
 
 use super::model::Model;
-use super::tally::Violation;
+use super::tally::{Violation, missed_handover};
 use crate::flow::Flow;
 use crate::interval::Interval;
 use crate::plant::STATES;
@@ -120,6 +120,11 @@ impl<'a> Replay<'a> {
             let breach = |kind, f| Some(Breach { kind, time_s, f });
             if step == Step::Outside {
                 return breach(Violation::Uncovered, x[AXIS_F]);
+            }
+            if missed_handover(self.table, state.phase, State(measured))
+                && state.ticks_left + 1 == self.table.header().period_ticks
+            {
+                return breach(Violation::Handover, x[AXIS_F]);
             }
             match state.phase {
                 Phase::C1 | Phase::C2 => {
