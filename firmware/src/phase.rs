@@ -118,4 +118,3 @@ impl PhaseState {
         (next, Step::Outside)
     }
 }
-

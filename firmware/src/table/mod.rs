@@ -14,11 +14,11 @@ mod write;
 
 pub use dense::{DENSE_HEADER_LEN, DenseView, bits_per_entry};
 pub use header::{
-    BYTE_ORDER_MARK, CRC_LEN, DIRECTORY_ENTRY_LEN, FORMAT_VERSION, HEADER_LEN, Header, LAWS, LEVELS_MAX, Law,
-    LawEntry, MAGIC, PlantParameters, SPEC_HASH_LEN,
+    BYTE_ORDER_MARK, CRC_LEN, DIRECTORY_ENTRY_LEN, FORMAT_VERSION, HEADER_LEN, Header, LAWS,
+    LEVELS_MAX, Law, LawEntry, MAGIC, PlantParameters, SPEC_HASH_LEN,
 };
 pub use law::{Encoding, InputsKind, LawView};
-pub use write::{WriteError, write_header, seal};
+pub use write::{WriteError, seal, write_header};
 
 use crate::grid::{Cell, GridError};
 

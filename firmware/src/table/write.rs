@@ -1,10 +1,10 @@
 //! The writer's side of the format: header into a buffer, then the seal over header and blocks.
 
+use super::checksum;
 use super::header::{
     ABSENT, BYTE_ORDER_MARK, CRC_LEN, DIRECTORY_AT, DIRECTORY_ENTRY_LEN, FORMAT_VERSION,
     HEADER_LEN, Header, MAGIC,
 };
-use super::checksum;
 use crate::units::STATES;
 
 /// Why a table cannot be written.

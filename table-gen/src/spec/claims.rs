@@ -1,0 +1,174 @@
+//! What is uncertain, what is to be proved, and what the table covers.
+
+use serde::{Deserialize, Serialize};
+
+use super::grid::to_micro;
+
+/// Bounds on what is not known exactly. Every bound holds at all times, for an adversary that may vary it.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct UncertaintySpec {
+    /// Band [low, high] of the lost infeed w. The paper treats 2 GW as exact.
+    ///
+    /// Unit: GW. Allowed: 2 numbers, each from -100 to 100. Default: [2, 2].
+    pub loss_gw: [f64; 2],
+    /// Relative error of participation: the fleet delivers u (1 +- this), at most 1. The paper simulates 0.1.
+    ///
+    /// Unit: 1. Allowed: a number from 0 to below 1. Default: 0.
+    pub participation: f64,
+    /// Bound on the error of the state estimate, per state (f, g, l, p).
+    ///
+    /// Unit: Hz, GW, GW, GW. Allowed: 4 numbers, each from 0 to 10. Default: [0, 0, 0, 0].
+    pub measurement: [f64; 4],
+    /// Time from a decision to the fleet's power. FACTS, "Actuation delay".
+    ///
+    /// Unit: s. Allowed: a number from 0 to 60. Default: 0.
+    pub actuation_delay_s: f64,
+    /// States in which the event may find the grid; must lie inside the grid.
+    pub initial: InitialBox,
+}
+
+impl Default for UncertaintySpec {
+    fn default() -> Self {
+        Self {
+            loss_gw: [2.0, 2.0],
+            participation: 0.0,
+            measurement: [0.0; 4],
+            actuation_delay_s: 0.0,
+            initial: InitialBox::default(),
+        }
+    }
+}
+
+/// A box of states (f, g, l, p).
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct InitialBox {
+    /// Lower corner.
+    ///
+    /// Unit: Hz, GW, GW, GW. Allowed: 4 numbers, each from -2000 to 2000. Default: [0, 0, 0, 0].
+    pub lower: [f64; 4],
+    /// Upper corner; may equal the lower one.
+    ///
+    /// Unit: Hz, GW, GW, GW. Allowed: 4 numbers, each from -2000 to 2000. Default: [0, 0, 0, 0].
+    pub upper: [f64; 4],
+}
+
+/// The claims to be proved (DESIGN section 4). Frequencies are deviations from 50 Hz.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct RequirementsSpec {
+    /// f stays at or above this, always; absent: no such claim. The paper's psi_1 has -0.8. Below `outer_hz`.
+    ///
+    /// Unit: Hz. Allowed: a number from -10 to 0, or none. Default: none.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub containment_hz: Option<f64>,
+    /// The larger target I1 = [low, high]: C1 brings f back into it. Whole µHz, inside the grid. The paper's
+    /// "Simulations with a Multi-phase Controller".
+    ///
+    /// Unit: Hz. Allowed: 2 numbers, each from -10 to 10. Default: [-0.3, 0].
+    pub outer_hz: [f64; 2],
+    /// The smaller target I2 = [low, high]: C2 brings f into it. Whole µHz, inside I1, which it may equal. The paper's
+    /// "Simulations with a Multi-phase Controller".
+    ///
+    /// Unit: Hz. Allowed: 2 numbers, each from -10 to 10. Default: [-0.15, 0].
+    pub inner_hz: [f64; 2],
+    /// Time from leaving I1 within which f is in I2. The paper's psi_3.
+    ///
+    /// Unit: s. Allowed: a number above 0 to 86400. Default: 60.
+    pub settle_within_s: f64,
+    /// Whether f, once in I2, must stay there for ever (adds the law Hold).
+    ///
+    /// Unit: -. Allowed: true or false. Default: false.
+    pub stay: bool,
+    /// Time from the event over which the claims are made; absent: for ever.
+    ///
+    /// Unit: s. Allowed: a number above 0 to 86400, or none. Default: none.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub horizon_s: Option<f64>,
+}
+
+impl Default for RequirementsSpec {
+    fn default() -> Self {
+        Self {
+            containment_hz: None,
+            outer_hz: [-0.30, 0.0],
+            inner_hz: [-0.15, 0.0],
+            settle_within_s: 60.0,
+            stay: false,
+            horizon_s: None,
+        }
+    }
+}
+
+impl RequirementsSpec {
+    /// [`Self::outer_hz`] in µHz, as the device compares it.
+    #[must_use]
+    pub fn outer_micro(&self) -> [i32; 2] {
+        micro(self.outer_hz)
+    }
+
+    /// [`Self::inner_hz`] in µHz, as the device compares it.
+    #[must_use]
+    pub fn inner_micro(&self) -> [i32; 2] {
+        micro(self.inner_hz)
+    }
+}
+
+fn micro(interval_hz: [f64; 2]) -> [i32; 2] {
+    interval_hz.map(|f_hz| to_micro(f_hz).clamp(i32::MIN.into(), i32::MAX.into()) as i32)
+}
+
+/// Which cells the table answers for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Domain {
+    /// Every winning cell.
+    Winning,
+    /// Only what the closed loop can reach from `uncertainty.initial`.
+    Reachable,
+}
+
+impl Domain {
+    /// All values as the spec writes them.
+    pub(super) const NAMES: &'static [&'static str] = &["winning", "reachable"];
+
+    /// The value as the spec writes it.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Winning => "winning",
+            Self::Reachable => "reachable",
+        }
+    }
+}
+
+/// What the table covers.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct TableSpec {
+    /// Which cells the table answers for. DESIGN section 3.
+    ///
+    /// Unit: -. Allowed: "winning" or "reachable". Default: "winning".
+    pub domain: Domain,
+}
+
+impl Default for TableSpec {
+    fn default() -> Self {
+        Self {
+            domain: Domain::Winning,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn targets_are_exact_on_the_device() {
+        let requirements = RequirementsSpec::default();
+        assert_eq!(requirements.outer_micro(), [-300_000, 0]);
+        assert_eq!(requirements.inner_micro(), [-150_000, 0]);
+    }
+}

@@ -1,0 +1,117 @@
+//! The spec's hash: which spec a table was made for.
+//!
+//! # Design
+//! SHA-256 over a canonical text, cut to 16 bytes. The text begins with the line `holdfast-spec-1`; then every key of
+//! the table in `keys`, in that order, defaults included, gives one line `path=value` ending in `\n`, with the value
+//!
+//! | kind | written as |
+//! |---|---|
+//! | number | the 16 lower-case hexadecimal digits of its IEEE 754 binary64 bits, most significant first; -0 as 0 |
+//! | numbers | the same, joined by `,` |
+//! | whole number | decimal |
+//! | flag | `true` or `false` |
+//! | name, choice | the characters themselves (a name cannot contain a line break) |
+//! | absent | `none` |
+//!
+//! Nothing in it depends on the platform, on the order of keys in the file or on how a number was written there. A new
+//! key changes every hash: a table must then be built and verified again, which is intended.
+
+use std::fmt::Write as _;
+
+use sha2::{Digest, Sha256};
+
+use super::Spec;
+use super::keys::{KEYS, KeyValue};
+
+const HEADING: &str = "holdfast-spec-1\n";
+
+impl Spec {
+    /// The first 16 bytes of SHA-256 over the canonical text of the resolved spec (all keys with their defaults): the
+    /// same on every platform, and different for specs that differ in any key.
+    #[must_use]
+    pub fn hash(&self) -> [u8; 16] {
+        let digest = Sha256::digest(self.canonical_text().as_bytes());
+        std::array::from_fn(|i| digest[i])
+    }
+
+    fn canonical_text(&self) -> String {
+        let mut text = HEADING.to_owned();
+        for key in KEYS {
+            text.push_str(key.path);
+            text.push('=');
+            push_value(&mut text, (key.get)(self));
+            text.push('\n');
+        }
+        text
+    }
+}
+
+fn push_value(text: &mut String, value: KeyValue<'_>) {
+    match value {
+        KeyValue::Number(x) => push_number(text, x),
+        KeyValue::Numbers(xs) => {
+            for (i, x) in xs.iter().enumerate() {
+                if i > 0 {
+                    text.push(',');
+                }
+                push_number(text, *x);
+            }
+        }
+        KeyValue::Integer(n) => text.push_str(&n.to_string()),
+        KeyValue::Flag(flag) => text.push_str(if flag { "true" } else { "false" }),
+        KeyValue::Text(word) => text.push_str(word),
+        KeyValue::Absent => text.push_str("none"),
+    }
+}
+
+fn push_number(text: &mut String, x: f64) {
+    // -0 + 0 is +0: two ways to write the same number must not give two hashes.
+    let bits = (x + 0.0).to_bits();
+    // Writing to a String cannot fail.
+    let _ = write!(text, "{bits:016x}");
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Computed outside this program, with Python's tomllib, struct and hashlib from the description above.
+    const PAPER_BI: &str = "4395fecf4e706849532ada94d3845c52";
+
+    fn hex(bytes: &[u8]) -> String {
+        bytes.iter().map(|byte| format!("{byte:02x}")).collect()
+    }
+
+    #[test]
+    fn the_hash_of_paper_bi_is_golden() {
+        let spec = Spec::load("paper-bi", &[]).unwrap();
+        assert_eq!(hex(&spec.hash()), PAPER_BI);
+    }
+
+    #[test]
+    fn the_canonical_text_is_as_documented() {
+        let text = Spec::default().canonical_text();
+        let mut lines = text.lines();
+        assert_eq!(lines.next(), Some("holdfast-spec-1"));
+        assert_eq!(lines.next(), Some("name=unnamed"));
+        assert_eq!(
+            lines.next(),
+            Some("plant.governor_gain_gw_per_hz=c014000000000000")
+        );
+        assert!(text.contains("\nfleet.chargers=25000\n"));
+        assert!(text.contains("\nuncertainty.loss_gw=4000000000000000,4000000000000000\n"));
+        assert!(text.contains("\nrequirements.containment_hz=none\n"));
+        assert!(text.ends_with("\nmethod.successor=growth-bound\n"));
+        assert_eq!(text.lines().count(), 1 + KEYS.len());
+    }
+
+    #[test]
+    fn the_sign_of_zero_and_the_way_a_number_is_written_do_not_matter() {
+        let hash = |text: &str| Spec::from_toml(text, "test", &[]).unwrap().hash();
+        assert_eq!(hash("uncertainty.participation = -0.0"), hash(""));
+        assert_eq!(
+            hash("sampling.period_s = 15e-1"),
+            hash("[sampling]\nwatch_s = 0.10\nperiod_s = 1.50")
+        );
+    }
+}

@@ -1,0 +1,267 @@
+//! The table of keys: the single source of units, ranges and descriptions.
+
+use std::fmt;
+
+use super::Spec;
+use super::allowed::{Allowed, Range};
+use super::claims::Domain;
+use super::grid::{Alignment, MICRO_PER_UNIT};
+use super::plant::Direction;
+use super::sampling::Successor;
+
+/// One key of the spec, for a listing: `table-gen` prints these as the reference of the spec file.
+#[derive(Debug, Clone, PartialEq)]
+pub struct KeyDoc {
+    /// Dotted path, such as `plant.damping_gw_per_hz`.
+    pub key: &'static str,
+    /// Unit of the value; `1` for a pure number, `-` where there is none.
+    pub unit: &'static str,
+    /// What the key may hold; `Display` gives it as text.
+    pub allowed: Allowed,
+    /// The default, as TOML writes it; `none` where the key is absent by default.
+    pub default: String,
+    /// What it is, in one line.
+    pub description: &'static str,
+}
+
+/// Every key with its default, unit, range and description, in the order of the spec file.
+#[must_use]
+pub fn reference() -> Vec<KeyDoc> {
+    let defaults = Spec::default();
+    KEYS.iter()
+        .map(|key| KeyDoc {
+            key: key.path,
+            unit: key.unit,
+            allowed: key.allowed,
+            default: (key.get)(&defaults).to_string(),
+            description: key.description,
+        })
+        .collect()
+}
+
+/// A value of the spec, borrowed from it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum KeyValue<'a> {
+    /// A number, or an optional one that is present.
+    Number(f64),
+    /// An array of numbers.
+    Numbers(&'a [f64]),
+    /// A whole number.
+    Integer(u32),
+    /// A flag.
+    Flag(bool),
+    /// A name or a choice.
+    Text(&'a str),
+    /// An optional key that is absent.
+    Absent,
+}
+
+impl fmt::Display for KeyValue<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Number(x) => write!(f, "{x}"),
+            Self::Numbers(xs) => {
+                f.write_str("[")?;
+                for (i, x) in xs.iter().enumerate() {
+                    write!(f, "{}{x}", if i == 0 { "" } else { ", " })?;
+                }
+                f.write_str("]")
+            }
+            Self::Integer(n) => write!(f, "{n}"),
+            Self::Flag(flag) => write!(f, "{flag}"),
+            Self::Text(text) => write!(f, "{text:?}"),
+            Self::Absent => f.write_str("none"),
+        }
+    }
+}
+
+/// One row of the table: what is known of a key, and how to find its value in a [`Spec`].
+pub(super) struct Key {
+    pub(super) path: &'static str,
+    pub(super) unit: &'static str,
+    pub(super) allowed: Allowed,
+    pub(super) description: &'static str,
+    pub(super) get: Getter,
+}
+
+type Getter = for<'a> fn(&'a Spec) -> KeyValue<'a>;
+
+impl Key {
+    /// What the key may hold, with its unit: the text of error messages.
+    pub(super) fn allowed_text(&self) -> String {
+        match self.unit {
+            "1" | "-" => self.allowed.to_string(),
+            unit => format!("{} ({unit})", self.allowed),
+        }
+    }
+
+    /// The path without its last part; empty for `name`.
+    pub(super) fn section(&self) -> &'static str {
+        section_of(self.path)
+    }
+}
+
+/// The part of a dotted path before its last dot; empty where there is none.
+pub(super) fn section_of(path: &str) -> &str {
+    path.rsplit_once('.').map_or("", |(section, _)| section)
+}
+
+/// The key with this path.
+pub(super) fn find(path: &str) -> Option<&'static Key> {
+    KEYS.iter().find(|key| key.path == path)
+}
+
+/// Whether `path` names a section (a table of keys), such as `plant` or `uncertainty.initial`.
+pub(super) fn is_section(path: &str) -> bool {
+    KEYS.iter().any(|key| {
+        key.path
+            .strip_prefix(path)
+            .is_some_and(|rest| rest.starts_with('.'))
+    })
+}
+
+/// Names allowed directly inside a section (the empty path: the top level), in order, each once.
+pub(super) fn names_in(section: &str) -> Vec<&'static str> {
+    let mut names = Vec::new();
+    for key in KEYS {
+        let inside = match section {
+            "" => Some(key.path),
+            _ => key
+                .path
+                .strip_prefix(section)
+                .and_then(|rest| rest.strip_prefix('.')),
+        };
+        if let Some(name) = inside.and_then(|rest| rest.split('.').next())
+            && !names.contains(&name)
+        {
+            names.push(name);
+        }
+    }
+    names
+}
+
+const fn row(
+    path: &'static str,
+    unit: &'static str,
+    allowed: Allowed,
+    description: &'static str,
+    get: Getter,
+) -> Key {
+    Key {
+        path,
+        unit,
+        allowed,
+        description,
+        get,
+    }
+}
+
+fn optional(value: Option<f64>) -> KeyValue<'static> {
+    value.map_or(KeyValue::Absent, KeyValue::Number)
+}
+
+const TIME_CONSTANT: Allowed = Allowed::Number(Range::closed(0.001, 1000.0));
+const DURATION: Range = Range::above(0.0, 86_400.0);
+const STATE: Allowed = Allowed::Numbers {
+    len: 4,
+    each: Range::closed(-STATE_MAX, STATE_MAX),
+};
+const WIDTH: Allowed = Allowed::Numbers {
+    len: 4,
+    each: Range::closed(1.0 / MICRO_PER_UNIT, WIDTH_MAX),
+};
+const INTERVAL: Allowed = Allowed::Numbers {
+    len: 2,
+    each: Range::closed(-10.0, 10.0),
+};
+const STATE_UNIT: &str = "Hz, GW, GW, GW";
+
+const STATE_MAX: f64 = 2000.0;
+const WIDTH_MAX: f64 = 100.0;
+// The outermost edge, half a cell past the end of the working region, is an i32 in micro-units on the device.
+const _: () = assert!((STATE_MAX + WIDTH_MAX / 2.0) * MICRO_PER_UNIT <= i32::MAX as f64);
+
+/// Every key, in the order of the spec file. The hash depends on this order and on the paths.
+#[rustfmt::skip] // One key to a group of lines, as a table.
+pub(super) const KEYS: &[Key] = &[
+    row("name", "-", Allowed::Name,
+        "name for reports and file names", |s| KeyValue::Text(&s.name)),
+
+    row("plant.governor_gain_gw_per_hz", "GW/Hz", Allowed::Number(Range::below(-100.0, 0.0)),
+        "governor gain 1/R_eq, negative", |s| KeyValue::Number(s.plant.governor_gain_gw_per_hz)),
+    row("plant.governor_time_s", "s", TIME_CONSTANT,
+        "governor time constant T_G", |s| KeyValue::Number(s.plant.governor_time_s)),
+    row("plant.turbine_time_s", "s", TIME_CONSTANT,
+        "turbine time constant T_t", |s| KeyValue::Number(s.plant.turbine_time_s)),
+    row("plant.lead_time_s", "s", Allowed::Number(Range::closed(0.0, 1000.0)),
+        "lead time constant T_1; 0 for a plain lag", |s| KeyValue::Number(s.plant.lead_time_s)),
+    row("plant.lag_time_s", "s", TIME_CONSTANT,
+        "lag time constant T_2", |s| KeyValue::Number(s.plant.lag_time_s)),
+    row("plant.damping_gw_per_hz", "GW/Hz", Allowed::Number(Range::closed(0.0, 1000.0)),
+        "load damping D", |s| KeyValue::Number(s.plant.damping_gw_per_hz)),
+    row("plant.inertia_gw_s_per_hz", "GW s/Hz", Allowed::Number(Range::closed(0.001, 10_000.0)),
+        "inertia H; 2H multiplies f'", |s| KeyValue::Number(s.plant.inertia_gw_s_per_hz)),
+
+    row("fleet.chargers", "1", Allowed::Integer { min: 1, max: 100_000_000 },
+        "number of chargers N_ev", |s| KeyValue::Integer(s.fleet.chargers)),
+    row("fleet.power_per_charger_kw", "kW", Allowed::Number(Range::closed(0.1, 1000.0)),
+        "power of one charger at participation 1, p_av", |s| KeyValue::Number(s.fleet.power_per_charger_kw)),
+    row("fleet.direction", "-", Allowed::Choice(Direction::NAMES),
+        "whether charging only stops or also reverses", |s| KeyValue::Text(s.fleet.direction.name())),
+
+    row("baseline.deadband_hz", "Hz", Allowed::Number(Range::closed(0.0, 5.0)),
+        "deviation without a response", |s| KeyValue::Number(s.baseline.deadband_hz)),
+    row("baseline.droop_hz", "Hz", Allowed::Number(Range::above(0.0, 10.0)),
+        "deviation past the deadband for full participation, R_ev", |s| KeyValue::Number(s.baseline.droop_hz)),
+    row("baseline.time_s", "s", TIME_CONSTANT,
+        "response time constant T_ev", |s| KeyValue::Number(s.baseline.time_s)),
+
+    row("grid.lower", STATE_UNIT, STATE,
+        "lower end of the working region (f, g, l, p)", |s| KeyValue::Numbers(&s.grid.lower)),
+    row("grid.upper", STATE_UNIT, STATE,
+        "upper end of the working region (f, g, l, p)", |s| KeyValue::Numbers(&s.grid.upper)),
+    row("grid.width", STATE_UNIT, WIDTH,
+        "width of a cell (f, g, l, p)", |s| KeyValue::Numbers(&s.grid.width)),
+    row("grid.alignment", "-", Allowed::Choice(Alignment::NAMES),
+        "whether lower and upper are cell centres or cell edges", |s| KeyValue::Text(s.grid.alignment.name())),
+
+    row("input.step", "1", Allowed::Number(Range::closed(0.03, 1.0)),
+        "distance between participations; divides 1", |s| KeyValue::Number(s.input.step)),
+
+    row("sampling.period_s", "s", Allowed::Number(Range::closed(0.001, 3600.0)),
+        "sampling time tau of C1, C2 and Hold", |s| KeyValue::Number(s.sampling.period_s)),
+    row("sampling.watch_s", "s", Allowed::Number(Range::closed(0.001, 60.0)),
+        "watch tick of No control and Fixed; divides the period", |s| KeyValue::Number(s.sampling.watch_s)),
+
+    row("uncertainty.loss_gw", "GW", Allowed::Numbers { len: 2, each: Range::closed(-100.0, 100.0) },
+        "band of the lost infeed w", |s| KeyValue::Numbers(&s.uncertainty.loss_gw)),
+    row("uncertainty.participation", "1", Allowed::Number(Range::below(0.0, 1.0)),
+        "relative error of participation", |s| KeyValue::Number(s.uncertainty.participation)),
+    row("uncertainty.measurement", STATE_UNIT, Allowed::Numbers { len: 4, each: Range::closed(0.0, 10.0) },
+        "bound on the state estimate's error (f, g, l, p)", |s| KeyValue::Numbers(&s.uncertainty.measurement)),
+    row("uncertainty.actuation_delay_s", "s", Allowed::Number(Range::closed(0.0, 60.0)),
+        "time from a decision to the fleet's power", |s| KeyValue::Number(s.uncertainty.actuation_delay_s)),
+    row("uncertainty.initial.lower", STATE_UNIT, STATE,
+        "lower corner of the states at the event (f, g, l, p)", |s| KeyValue::Numbers(&s.uncertainty.initial.lower)),
+    row("uncertainty.initial.upper", STATE_UNIT, STATE,
+        "upper corner of the states at the event (f, g, l, p)", |s| KeyValue::Numbers(&s.uncertainty.initial.upper)),
+
+    row("requirements.containment_hz", "Hz", Allowed::OptionalNumber(Range::closed(-10.0, 0.0)),
+        "f never falls below this; absent: no such claim", |s| optional(s.requirements.containment_hz)),
+    row("requirements.outer_hz", "Hz", INTERVAL,
+        "larger target I1", |s| KeyValue::Numbers(&s.requirements.outer_hz)),
+    row("requirements.inner_hz", "Hz", INTERVAL,
+        "smaller target I2, inside I1", |s| KeyValue::Numbers(&s.requirements.inner_hz)),
+    row("requirements.settle_within_s", "s", Allowed::Number(DURATION),
+        "time from leaving I1 to reaching I2", |s| KeyValue::Number(s.requirements.settle_within_s)),
+    row("requirements.stay", "-", Allowed::Flag,
+        "whether f stays in I2 for ever", |s| KeyValue::Flag(s.requirements.stay)),
+    row("requirements.horizon_s", "s", Allowed::OptionalNumber(DURATION),
+        "time from the event over which claims are made; absent: for ever", |s| optional(s.requirements.horizon_s)),
+
+    row("table.domain", "-", Allowed::Choice(Domain::NAMES),
+        "which cells the table answers for", |s| KeyValue::Text(s.table.domain.name())),
+
+    row("method.successor", "-", Allowed::Choice(Successor::NAMES),
+        "how the radius of a successor box is bounded", |s| KeyValue::Text(s.method.successor.name())),
+];

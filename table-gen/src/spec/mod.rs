@@ -1,0 +1,48 @@
+//! The specification: everything that synthesis, verification and simulation take from the user.
+//!
+//! A spec is a TOML document (DESIGN section 3). On its way in it passes through, in this order:
+//!
+//! | step | file | what can be wrong |
+//! |---|---|---|
+//! | a shipped name or a path becomes text | `shipped`, `load` | unknown name, unreadable file |
+//! | text becomes a table of keys | `load` | syntax, with line and column |
+//! | names and types are checked against the key table | `keys`, `resolve` | unknown key, wrong type |
+//! | `--set KEY=VALUE` replaces single keys | `overrides` | the same, named as an override |
+//! | missing keys take their defaults | `plant`, `grid`, `sampling`, `claims` | |
+//! | ranges, then relations between keys | `validate`, `geometry`, `memory` | a value or a combination that cannot be |
+//!
+//! What comes out is a [`Spec`]: plain numbers in the units that the key names carry. [`Spec::hash`] names it in
+//! the table's header, so that a table can be told from one made for another spec.
+//!
+//! # Design
+//! One table of keys (`keys`) holds unit, range and description. The range check, the error texts, the listing
+//! for people ([`reference()`]) and the hash all walk that table, so they cannot disagree; a test compares it with
+//! the structs and with their documentation.
+
+mod allowed;
+mod claims;
+mod error;
+mod geometry;
+mod grid;
+mod hash;
+mod keys;
+mod load;
+mod memory;
+mod overrides;
+mod plant;
+mod resolve;
+mod sampling;
+mod schema;
+mod shipped;
+#[cfg(test)]
+mod tests;
+mod validate;
+
+pub use allowed::{Allowed, Range};
+pub use claims::{Domain, InitialBox, RequirementsSpec, TableSpec, UncertaintySpec};
+pub use error::SpecError;
+pub use grid::{Alignment, GridSpec};
+pub use keys::{KeyDoc, reference};
+pub use plant::{BaselineSpec, Direction, FleetSpec, PlantSpec};
+pub use sampling::{InputSpec, MethodSpec, SamplingSpec, Successor};
+pub use schema::Spec;

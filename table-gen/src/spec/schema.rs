@@ -1,0 +1,90 @@
+//! The whole spec as one value, and the quantities that follow from several of its sections.
+
+use serde::{Deserialize, Serialize};
+
+use super::{
+    BaselineSpec, FleetSpec, GridSpec, InputSpec, MethodSpec, PlantSpec, RequirementsSpec,
+    SamplingSpec, TableSpec, UncertaintySpec,
+};
+
+/// A complete specification; one field per section of the TOML document (DESIGN section 3).
+///
+/// `Spec::default()` holds every key's documented default. A spec from [`Spec::load`] or [`Spec::from_toml`] has been
+/// validated; one that was put together or changed in code should pass [`Spec::validate`] before use.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Spec {
+    /// Name for reports and file names.
+    ///
+    /// Unit: -. Allowed: 1 to 64 ASCII letters, digits, - _ or ., the first a letter or digit. Default: "unnamed".
+    pub name: String,
+    /// The grid's frequency dynamics without the fleet (the paper's Table I).
+    pub plant: PlantSpec,
+    /// The charging fleet.
+    pub fleet: FleetSpec,
+    /// The droop controller that the paper compares with, and that the firmware falls back to.
+    pub baseline: BaselineSpec,
+    /// The cells of the state space.
+    pub grid: GridSpec,
+    /// The inputs: participations of the fleet.
+    pub input: InputSpec,
+    /// When decisions are made.
+    pub sampling: SamplingSpec,
+    /// What is not known exactly, as bounds.
+    pub uncertainty: UncertaintySpec,
+    /// What is to be proved.
+    pub requirements: RequirementsSpec,
+    /// What the table covers.
+    pub table: TableSpec,
+    /// How the abstraction is computed.
+    pub method: MethodSpec,
+}
+
+impl Default for Spec {
+    fn default() -> Self {
+        Self {
+            name: "unnamed".to_owned(),
+            plant: PlantSpec::default(),
+            fleet: FleetSpec::default(),
+            baseline: BaselineSpec::default(),
+            grid: GridSpec::default(),
+            input: InputSpec::default(),
+            sampling: SamplingSpec::default(),
+            uncertainty: UncertaintySpec::default(),
+            requirements: RequirementsSpec::default(),
+            table: TableSpec::default(),
+            method: MethodSpec::default(),
+        }
+    }
+}
+
+impl Spec {
+    /// P = `N_ev` `p_av`: the power in GW by which the whole fleet can move the balance at participation 1.
+    ///
+    /// 1.4 GW for the paper's bidirectional fleet, 0.7 GW for the unidirectional one.
+    #[must_use]
+    pub fn fleet_power_gw(&self) -> f64 {
+        /// kW per GW.
+        const KW_PER_GW: f64 = 1e6;
+        f64::from(self.fleet.chargers) * self.fleet.power_per_charger_kw / KW_PER_GW
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_fleet_power_is_the_papers() {
+        let mut spec = Spec::default();
+        // 25000 * 56 is exact in binary and one division rounds once: equality holds.
+        assert_eq!(spec.fleet_power_gw(), 1.4);
+        spec.fleet.power_per_charger_kw = 28.0;
+        assert_eq!(spec.fleet_power_gw(), 0.7);
+    }
+
+    #[test]
+    fn the_defaults_are_valid() {
+        Spec::default().validate("default").unwrap();
+    }
+}

@@ -1,0 +1,168 @@
+//! The spec from outside: shipped specs and overrides here, then every key in turn, then relations between keys.
+
+use std::collections::BTreeSet;
+
+use super::*;
+
+mod keys;
+mod relations;
+
+fn with(overrides: &[&str]) -> Result<Spec, SpecError> {
+    let overrides: Vec<String> = overrides.iter().map(ToString::to_string).collect();
+    Spec::load("paper-bi", &overrides)
+}
+
+/// Loads paper-bi with overrides that must be refused for `key`; gives the message.
+fn refused(overrides: &[&str], key: &str) -> String {
+    let Err(error) = with(overrides) else {
+        panic!("{overrides:?} was accepted")
+    };
+    let message = error.to_string();
+    assert_eq!(error.key(), Some(key), "{message}");
+    assert!(
+        message.contains(key) && message.contains("allowed"),
+        "{message}"
+    );
+    message
+}
+
+/// Dotted paths of all keys of a document.
+fn leaves(document: &toml::Table) -> BTreeSet<String> {
+    let mut found = BTreeSet::new();
+    let mut pending = vec![(String::new(), document)];
+    while let Some((prefix, table)) = pending.pop() {
+        for (name, value) in table {
+            match value {
+                toml::Value::Table(inner) => pending.push((format!("{prefix}{name}."), inner)),
+                _ => drop(found.insert(format!("{prefix}{name}"))),
+            }
+        }
+    }
+    found
+}
+
+#[test]
+fn shipped_specs_load_and_have_the_papers_size() {
+    assert_eq!(Spec::shipped_names(), ["paper-bi", "paper-uni"]);
+    for name in Spec::shipped_names() {
+        let spec = Spec::load(name, &[]).unwrap();
+        assert_eq!(spec.name, *name);
+        assert_eq!(spec.grid.cells(), 2_358_443);
+        assert_eq!(spec.input.levels(), 21);
+        assert_eq!(spec.requirements.horizon_s, Some(120.0));
+        assert_eq!(spec.requirements.containment_hz, Some(-0.8));
+    }
+    let bi = Spec::load("paper-bi", &[]).unwrap();
+    assert_eq!(
+        (bi.grid.cell_counts(), bi.sampling.ticks_per_period()),
+        ([23, 41, 41, 61], 15)
+    );
+    let uni = Spec::load("paper-uni", &[]).unwrap();
+    assert_eq!(
+        (uni.grid.cell_counts(), uni.sampling.ticks_per_period()),
+        ([23, 61, 41, 41], 20)
+    );
+    assert_eq!(
+        (uni.fleet_power_gw(), uni.fleet.direction),
+        (0.7, Direction::Unidirectional)
+    );
+}
+
+#[test]
+fn the_defaults_are_paper_bi_without_name_containment_and_horizon() {
+    let overrides = [
+        "name=unnamed",
+        "requirements.containment_hz=none",
+        "requirements.horizon_s=none",
+    ];
+    assert_eq!(with(&overrides).unwrap(), Spec::default());
+    assert_eq!(Spec::from_toml("", "empty", &[]).unwrap(), Spec::default());
+}
+
+#[test]
+fn shipped_specs_state_every_key() {
+    for (name, text) in super::shipped::SHIPPED {
+        let document: toml::Table = toml::from_str(text).unwrap();
+        let stated: BTreeSet<String> = leaves(&document);
+        let all: BTreeSet<String> = reference().iter().map(|doc| doc.key.to_owned()).collect();
+        assert_eq!(stated, all, "{name}");
+    }
+}
+
+#[test]
+fn overrides_apply_in_order_and_none_removes_an_optional_key() {
+    let spec = with(&[
+        "plant.inertia_gw_s_per_hz=3",
+        "plant.inertia_gw_s_per_hz=3.5",
+        "grid.alignment=edges",
+        "requirements.containment_hz=none",
+        "uncertainty.initial={ lower = [-0.02, 0, 0, 0] }",
+        "uncertainty.initial.upper=[0.02, 0, 0, 0]",
+        "name=trial",
+    ])
+    .unwrap();
+    assert_eq!(spec.plant.inertia_gw_s_per_hz, 3.5);
+    assert_eq!(spec.grid.alignment, Alignment::Edges);
+    assert_eq!(spec.requirements.containment_hz, None);
+    assert_eq!(spec.uncertainty.initial.lower[0], -0.02);
+    assert_eq!(spec.uncertainty.initial.upper[0], 0.02);
+    assert_eq!(spec.name, "trial");
+    // Removing what is absent is no error.
+    with(&["requirements.horizon_s=none", "requirements.horizon_s=none"]).unwrap();
+}
+
+#[test]
+fn the_hash_changes_with_every_key() {
+    // A value other than the default that is valid beside the others.
+    let changes = [
+        "name=other",
+        "plant.governor_gain_gw_per_hz=-4",
+        "plant.governor_time_s=2",
+        "plant.turbine_time_s=1",
+        "plant.lead_time_s=1",
+        "plant.lag_time_s=11",
+        "plant.damping_gw_per_hz=2",
+        "plant.inertia_gw_s_per_hz=3",
+        "fleet.chargers=25001",
+        "fleet.power_per_charger_kw=28",
+        "fleet.direction=unidirectional",
+        "baseline.deadband_hz=0.1",
+        "baseline.droop_hz=0.4",
+        "baseline.time_s=0.03",
+        "grid.lower=[-1, -0.05, 0, 0]",
+        "grid.upper=[0.1, 2, 2, 2.95]",
+        "grid.width=[0.05, 0.05, 0.05, 0.1]",
+        "grid.alignment=edges",
+        "input.step=0.1",
+        "sampling.period_s=1.6",
+        "sampling.watch_s=0.05",
+        "uncertainty.loss_gw=[1.9, 2]",
+        "uncertainty.participation=0.1",
+        "uncertainty.measurement=[0, 0, 0, 0.01]",
+        "uncertainty.actuation_delay_s=0.5",
+        "uncertainty.initial.lower=[-0.01, 0, 0, 0]",
+        "uncertainty.initial.upper=[0.01, 0, 0, 0]",
+        "requirements.containment_hz=none",
+        "requirements.outer_hz=[-0.35, 0]",
+        "requirements.inner_hz=[-0.2, 0]",
+        "requirements.settle_within_s=59",
+        "requirements.stay=true",
+        "requirements.horizon_s=none",
+        "table.domain=reachable",
+        "method.successor=exact-linear",
+    ];
+    let changed: Vec<&str> = changes
+        .iter()
+        .map(|text| text.split('=').next().unwrap())
+        .collect();
+    let all: Vec<&str> = reference().iter().map(|doc| doc.key).collect();
+    assert_eq!(changed, all);
+
+    let mut hashes = BTreeSet::from([with(&[]).unwrap().hash()]);
+    for change in changes {
+        assert!(
+            hashes.insert(with(&[change]).unwrap().hash()),
+            "{change} gives a hash that was there before"
+        );
+    }
+}

@@ -1,0 +1,314 @@
+//! From a spec to its laws: which games are played on which cells.
+//!
+//! | law | game | target | in the spec |
+//! |---|---|---|---|
+//! | C1 | reach-avoid | whole cells in I1 | always |
+//! | C2 | reach-avoid | whole cells in I2 | if I2 is smaller than I1 |
+//! | Hold | safety | stay in whole cells in I2 | `stay = true`; then C2, or C1 if there is no C2, reaches Hold's kernel |
+//!
+//! "Avoid" is every cell of which any part lies below containment. With a measurement error e, the cell is that of the
+//! estimate: the real frequency may lie e outside it, so bands shrink and containment rises by e.
+//!
+//! All numbers of the abstraction are in the device's micro-units, so that the edges of the cells are exact.
+
+use std::time::Instant;
+
+use firmware::grid::{Grid, GridError};
+
+use crate::abstraction::Abstraction;
+use crate::abstraction::affine::{AbstractionError, AffineAbstraction, AffineInput, Growth};
+use crate::game::bitset::BitSet;
+use crate::game::{GameError, Solution, Watch, reach::reach, safety::safety};
+use crate::grid_shape::GridShape;
+use crate::interval::Interval;
+use crate::plant::{GridPlant, STATES};
+use crate::spec::{Spec, Successor};
+use crate::usage;
+
+/// Micro-units in a unit.
+pub const MICRO: f64 = firmware::units::MICRO as f64;
+
+/// A law's game, solved.
+#[derive(Debug, Clone)]
+pub struct SolvedLaw {
+    /// Allowed inputs and ranks.
+    pub solution: Solution,
+    /// Target cells (the kernel itself for Hold).
+    pub target_cells: usize,
+    /// Processor time of the game \[s\].
+    pub cpu_s: f64,
+    /// Wall time of the game \[s\].
+    pub wall_s: f64,
+}
+
+/// All laws of a spec.
+#[derive(Debug, Clone)]
+pub struct Synthesis {
+    /// The device's grid.
+    pub grid: Grid,
+    /// Reaches I1.
+    pub c1: SolvedLaw,
+    /// Reaches I2; absent if I1 = I2.
+    pub c2: Option<SolvedLaw>,
+    /// Stays in I2; absent without `stay`.
+    pub hold: Option<SolvedLaw>,
+    /// Processor time of the abstraction's tables \[s\].
+    pub abstraction_cpu_s: f64,
+}
+
+/// Why there are no laws.
+#[derive(Debug, thiserror::Error)]
+pub enum SynthesisError {
+    /// The spec's grid is not one for the device.
+    #[error("the grid does not fit the device: {0:?}")]
+    Grid(GridError),
+    /// The abstraction cannot be built.
+    #[error(transparent)]
+    Abstraction(#[from] AbstractionError),
+    /// A game has no result.
+    #[error("{game}: {error}")]
+    Game {
+        /// The law whose game it is.
+        game: &'static str,
+        /// Why.
+        error: GameError,
+    },
+    /// A game has an empty answer: no controller exists on this grid.
+    #[error("{game}: no controller exists on this grid: {reason}")]
+    NoController {
+        /// The law whose game it is.
+        game: &'static str,
+        /// Which requirement fails, and how close it came.
+        reason: String,
+    },
+}
+
+/// The device's grid of a spec.
+///
+/// # Errors
+/// As [`Grid::new`].
+pub fn device_grid(spec: &Spec) -> Result<Grid, GridError> {
+    // Counts above 65535 were refused by the spec.
+    let count = spec.grid.cell_counts().map(|n| n as u16);
+    Grid::new(
+        spec.grid.lower_edges_micro(),
+        spec.grid.widths_micro(),
+        count,
+    )
+}
+
+/// The engine's view of the device's grid, in micro-units.
+pub fn grid_shape(grid: &Grid) -> GridShape<STATES> {
+    GridShape {
+        lower: grid.lower_edge().map(f64::from),
+        width: grid.width().map(f64::from),
+        count: grid.count().map(u32::from),
+    }
+}
+
+/// Net power `P u' - w` \[µGW\] under a commanded participation: u' within the participation error, at most the whole
+/// fleet, and w within its band.
+pub fn net_power(spec: &Spec, level: usize) -> Interval {
+    let fleet = Interval::point(spec.fleet_power_gw()) * Interval::point(MICRO);
+    let u = Interval::point(spec.input.value(level));
+    let error = Interval::point(spec.uncertainty.participation);
+    let low = (u * (Interval::ONE - error)).low.max(0.0);
+    let high = (u * (Interval::ONE + error)).high.min(1.0);
+    let [loss_low, loss_high] = spec.uncertainty.loss_gw;
+    let loss = Interval::hull(loss_low, loss_high) * Interval::point(MICRO);
+    fleet * Interval::hull(low, high) - loss
+}
+
+/// Bound of the estimate's error \[micro-units\], rounded up.
+pub fn measurement_micro(spec: &Spec) -> [f64; STATES] {
+    spec.uncertainty
+        .measurement
+        .map(|e| if e == 0.0 { 0.0 } else { (e * MICRO).next_up() })
+}
+
+/// The abstraction of a spec's plant on its grid.
+///
+/// # Errors
+/// As [`AffineAbstraction::new`].
+pub fn abstraction(
+    spec: &Spec,
+    grid: &Grid,
+) -> Result<AffineAbstraction<STATES>, AbstractionError> {
+    let (a, b) = GridPlant::new(spec).matrices();
+    let inputs: Vec<_> = (0..spec.input.levels())
+        .map(|level| AffineInput {
+            a,
+            b,
+            drive: net_power(spec, level),
+        })
+        .collect();
+    let growth = match spec.method.successor {
+        Successor::GrowthBound => Growth::GrowthBound,
+        Successor::ExactLinear => Growth::ExactLinear,
+    };
+    // The period in seconds is a whole number of milliseconds.
+    let period_s = f64::from(spec.sampling.period_ms()) / 1000.0;
+    AffineAbstraction::new(
+        grid_shape(grid),
+        &inputs,
+        period_s,
+        growth,
+        measurement_micro(spec),
+    )
+}
+
+/// Cells whose whole frequency interval, widened by the measurement error, lies in a band \[µHz\].
+fn cells_within(grid: &Grid, low: f64, high: f64, error: f64) -> BitSet {
+    by_frequency(grid, |cell_low, cell_high| {
+        cell_low - error >= low && cell_high + error <= high
+    })
+}
+
+/// Cells chosen by their frequency interval \[µHz\].
+fn by_frequency(grid: &Grid, choose: impl Fn(f64, f64) -> bool) -> BitSet {
+    let shape = grid_shape(grid);
+    let row: Vec<bool> = (0..shape.count[0])
+        .map(|f| {
+            let (low, high) = shape.interval(0, f);
+            choose(low, high)
+        })
+        .collect();
+    let mut set = BitSet::new(shape.cells());
+    for index in 0..shape.cells() {
+        if row[index % row.len()] {
+            set.insert(index);
+        }
+    }
+    set
+}
+
+/// Plays the games of a spec. `watch` is asked for an observer of each game by its name.
+///
+/// # Errors
+/// A grid or abstraction that cannot be, an empty target, an empty kernel or winning set, or an interruption.
+pub fn synthesise<'w>(
+    spec: &Spec,
+    watch: &dyn Fn(&'static str) -> Box<dyn Watch + 'w>,
+) -> Result<Synthesis, SynthesisError> {
+    let grid = device_grid(spec).map_err(SynthesisError::Grid)?;
+    let before = usage::cpu_s();
+    let abstraction = abstraction(spec, &grid)?;
+    let abstraction_cpu_s = usage::cpu_s() - before;
+    let error = measurement_micro(spec)[0];
+    let requirements = &spec.requirements;
+    let [outer_low, outer_high] = requirements.outer_micro().map(f64::from);
+    let [inner_low, inner_high] = requirements.inner_micro().map(f64::from);
+    let outer = cells_within(&grid, outer_low, outer_high, error);
+    let inner = cells_within(&grid, inner_low, inner_high, error);
+    let avoid = match requirements.containment_hz {
+        None => BitSet::new(outer.len()),
+        Some(hz) => {
+            // A cell counts as contained only if its lower end, less the error, is at or above the limit.
+            let limit = (hz * MICRO).next_up();
+            let limit = if hz * MICRO == (hz * MICRO).round() {
+                hz * MICRO
+            } else {
+                limit
+            };
+            by_frequency(&grid, |low, _| low - error < limit)
+        }
+    };
+    let hold = if requirements.stay {
+        let law = solve("Hold", watch, |watch| safety(&abstraction, &inner, watch))?;
+        if law.solution.winning == 0 {
+            return Err(SynthesisError::NoController {
+                game: "Hold",
+                reason: format!(
+                    "of the {} cells in I2 none can stay there; the last one died in sweep {}",
+                    inner.count(),
+                    law.solution.sweeps
+                ),
+            });
+        }
+        Some(law)
+    } else {
+        None
+    };
+    let kernel = hold.as_ref().map(|law| law.solution.winning_set(true));
+    let same = requirements.outer_micro() == requirements.inner_micro();
+    let play = |name, target: &BitSet| {
+        let law = solve(name, watch, |watch| {
+            reach(&abstraction, target, &avoid, watch)
+        })?;
+        if law.solution.winning == 0 {
+            return Err(SynthesisError::NoController {
+                game: name,
+                reason: format!(
+                    "no cell outside the target's {} can be driven into it",
+                    law.target_cells
+                ),
+            });
+        }
+        Ok(law)
+    };
+    let c2 = match (same, &kernel) {
+        (true, _) => None,
+        (false, Some(kernel)) => Some(play("C2", kernel)?),
+        (false, None) => Some(play("C2", &inner)?),
+    };
+    let c1_target = match (&kernel, &c2) {
+        (None, _) => outer,
+        (Some(kernel), None) => kernel.clone(),
+        (Some(_), Some(c2)) => {
+            // C1 hands over where C2 (or Hold) has an entry and f is in I1.
+            let mut target = c2.solution.winning_set(true);
+            for index in 0..target.len() {
+                if !outer.contains(index) {
+                    target.remove(index);
+                }
+            }
+            target
+        }
+    };
+    let c1 = play("C1", &c1_target)?;
+    Ok(Synthesis {
+        grid,
+        c1,
+        c2,
+        hold,
+        abstraction_cpu_s,
+    })
+}
+
+fn solve<'w>(
+    game: &'static str,
+    watch: &dyn Fn(&'static str) -> Box<dyn Watch + 'w>,
+    play: impl FnOnce(&dyn Watch) -> Result<Solution, GameError>,
+) -> Result<SolvedLaw, SynthesisError> {
+    let (cpu, wall) = (usage::cpu_s(), Instant::now());
+    let watch = watch(game);
+    let solution = play(watch.as_ref()).map_err(|error| SynthesisError::Game { game, error })?;
+    let target_cells = solution.ranks.iter().filter(|rank| **rank == 0).count();
+    Ok(SolvedLaw {
+        solution,
+        target_cells,
+        cpu_s: usage::cpu_s() - cpu,
+        wall_s: wall.elapsed().as_secs_f64(),
+    })
+}
+
+/// Transitions of the abstraction: cells in the boxes of all allowed pairs. A count for comparison with tools that store
+/// them; nothing else needs it.
+pub fn count_transitions<const D: usize, A: Abstraction<D>>(abstraction: &A) -> u64 {
+    use rayon::prelude::*;
+    let shape = abstraction.shape();
+    (0..shape.cells())
+        .into_par_iter()
+        .map(|index| {
+            let anchor = abstraction.anchor(shape.cell(index));
+            (0..abstraction.inputs())
+                .filter_map(|input| abstraction.successor(&anchor, input))
+                .map(|cells| {
+                    (0..D)
+                        .map(|d| u64::from(cells.high[d] - cells.low[d] + 1))
+                        .product::<u64>()
+                })
+                .sum::<u64>()
+        })
+        .sum()
+}
