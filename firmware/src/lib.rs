@@ -13,6 +13,10 @@
 //! | [`droop`] | a frequency | the baseline participation, used as the fallback |
 //! | [`control_loop`] | one state a tick | one [`control_loop::Action`] a tick |
 //! | [`dispatch`] | a participation | this charger's current or power |
+//! | [`charger`] | one reading a tick | all of the above, with a defined [`fault`] state for whatever is missing |
+//! | [`telemetry`] | a tick's report | a frame on a serial line |
+//! | [`flash`] | a flash region | the table's bytes |
+//! | [`link`] | requests of a host | the answers of a charger: processor in the loop |
 //!
 //! Nothing here allocates, recurses or panics; nothing is `unsafe`. Everything that decides is integer arithmetic,
 //! so the host's abstraction and verifier, the simulator and the charger compute the same bits.
@@ -39,3 +43,13 @@ pub mod droop;
 pub mod control_loop;
 
 pub mod dispatch;
+
+pub mod fault;
+
+pub mod charger;
+
+pub mod telemetry;
+
+pub mod flash;
+
+pub mod link;
