@@ -12,6 +12,9 @@
 //! | [`synthesis`] | a spec | the laws C1, C2, Hold |
 //! | [`emit`] | laws | the bytes of a table |
 //! | [`pipeline`] | a spec | a table, the whole way |
+//! | [`verify`] | bytes and a spec | a verdict, independently of all before |
+//! | [`falsify`] | bytes and a spec | a real trajectory that breaks a claim, if a search finds one |
+//! | [`logic`] | a temporal formula | requirements, and monitors of traces |
 //! | [`simulation`] | a table, or a baseline | the grid's frequency in time |
 //! | [`replay`] | a recorded frequency | what the firmware would have done |
 //! | [`cli`] | arguments | all of the above |
@@ -20,10 +23,12 @@
 pub mod abstraction;
 pub mod cli;
 pub mod emit;
+pub mod falsify;
 pub mod flow;
 pub mod game;
 pub mod grid_shape;
 pub mod interval;
+pub mod logic;
 pub mod pipeline;
 pub mod plant;
 pub mod replay;
