@@ -14,10 +14,12 @@
 //! | [`pipeline`] | a spec | a table, the whole way |
 //! | [`simulation`] | a table, or a baseline | the grid's frequency in time |
 //! | [`replay`] | a recorded frequency | what the firmware would have done |
+//! | [`boost_converter`] | a second plant: the engine knows none | |
 //! | [`cli`] | arguments | all of the above |
 #![forbid(unsafe_code)]
 
 pub mod abstraction;
+pub mod boost_converter;
 pub mod cli;
 pub mod emit;
 pub mod flow;
