@@ -247,7 +247,7 @@ impl<'t, S: FrequencySource, D: Dispatch, W: Watchdog> Charger<'t, S, D, W> {
 
     /// Ticks by which to advance; starts the observer again after a jump of the clock.
     fn ticks_due(&mut self, now_ms: u32, faults: &mut Faults) -> u16 {
-        let tick = u32::from(self.tick_ms);
+        let tick = u32::from(self.tick_ms).max(1);
         let Some(last_ms) = self.last_ms else {
             self.last_ms = Some(now_ms);
             return 1;
