@@ -1,4 +1,5 @@
 //! The engine against a slow solver on random small plants, grids and targets, and on any number of threads.
+#![allow(clippy::unwrap_used, reason = "a test that cannot go on fails")]
 
 use nalgebra::{DMatrix, DVector};
 use proptest::prelude::*;
