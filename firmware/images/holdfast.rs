@@ -61,7 +61,7 @@ const CABLE_MA: u32 = 32_000;
 /// Longest time without a completed tick \[ms\].
 const WATCHDOG_MS: u32 = 400;
 
-const _: () = assert!(CORE_MHZ * 1_000_000 % TIMER_HZ == 0);
+const _: () = assert!((CORE_MHZ * 1_000_000).is_multiple_of(TIMER_HZ));
 
 /// The independent watchdog, which runs on its own oscillator.
 struct Dog(IndependentWatchdog);
