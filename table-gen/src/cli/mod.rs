@@ -2,8 +2,11 @@
 //!
 //! Exit codes: 0 done; 1 the answer is "no" (not verified, no controller exists, limit reached); 2 bad input.
 
+mod band;
 mod build;
+mod monte_carlo;
 mod output;
+mod plot;
 mod progress;
 mod replay;
 mod simulate;
