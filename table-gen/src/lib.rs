@@ -31,3 +31,4 @@ pub mod simulation;
 pub mod spec;
 pub mod synthesis;
 pub mod usage;
+pub mod verify;

@@ -19,7 +19,7 @@ use crate::synthesis;
 
 /// Arguments of `build`.
 #[derive(Debug, clap::Args)]
-pub struct BuildArgs {
+pub(super) struct BuildArgs {
     #[command(flatten)]
     spec: SpecArgs,
     #[command(flatten)]
@@ -50,7 +50,7 @@ struct BuildReport<'r> {
 }
 
 /// Runs the command.
-pub fn run(args: &BuildArgs) -> Result<(), Failure> {
+pub(super) fn run(args: &BuildArgs) -> Result<(), Failure> {
     let spec = args.spec.load()?;
     progress::catch_interrupts();
     let synthesis = synthesis::synthesise(&spec, &progress::watch)?;
@@ -122,7 +122,7 @@ fn print_encodings(report: &BuildReport<'_>) {
 }
 
 /// Lower-case hexadecimal.
-pub fn hex(bytes: &[u8]) -> String {
+pub(super) fn hex(bytes: &[u8]) -> String {
     bytes.iter().map(|byte| format!("{byte:02x}")).collect()
 }
 

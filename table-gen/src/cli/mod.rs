@@ -11,6 +11,7 @@ mod progress;
 mod replay;
 mod simulate;
 mod synth;
+mod verify;
 
 use std::process::ExitCode;
 
@@ -36,6 +37,8 @@ enum Command {
     Simulate(simulate::SimulateArgs),
     /// Run the firmware on a recorded frequency
     Replay(replay::ReplayArgs),
+    /// Check the bytes of a table against a spec, independently of how they were made
+    Verify(verify::VerifyArgs),
 }
 
 /// The spec and what overrides it.
@@ -141,6 +144,7 @@ pub fn run() -> ExitCode {
         Command::Synth(args) => synth::run(&args),
         Command::Simulate(args) => simulate::run(&args),
         Command::Replay(args) => replay::run(&args),
+        Command::Verify(args) => verify::run(&args),
     };
     match result {
         Ok(()) => ExitCode::SUCCESS,

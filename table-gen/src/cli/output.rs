@@ -8,7 +8,7 @@ use serde::Serialize;
 use super::Failure;
 
 /// A table for people; all columns but the first are numbers and stand to the right.
-pub fn table(header: &[&str]) -> Table {
+pub(super) fn table(header: &[&str]) -> Table {
     let mut table = Table::new();
     table.load_style(presets::UTF8_HORIZONTAL_ONLY);
     table.set_header(header.iter().copied());
@@ -21,23 +21,23 @@ pub fn table(header: &[&str]) -> Table {
 }
 
 /// Writes a line to stdout. A closed pipe ends the output, not the program.
-pub fn line(text: impl std::fmt::Display) {
+pub(super) fn line(text: impl std::fmt::Display) {
     let _ = writeln!(std::io::stdout(), "{text}");
 }
 
 /// Prints one JSON object.
-pub fn json(value: &impl Serialize) -> Result<(), Failure> {
+pub(super) fn json(value: &impl Serialize) -> Result<(), Failure> {
     let text = serde_json::to_string_pretty(value).map_err(Failure::bad)?;
     line(text);
     Ok(())
 }
 
 /// A number with thousands separators.
-pub fn grouped(n: usize) -> String {
+pub(super) fn grouped(n: usize) -> String {
     let digits = n.to_string();
     let mut out = String::new();
     for (index, digit) in digits.chars().enumerate() {
-        if index > 0 && (digits.len() - index) % 3 == 0 {
+        if index > 0 && (digits.len() - index).is_multiple_of(3) {
             out.push(',');
         }
         out.push(digit);
@@ -46,6 +46,6 @@ pub fn grouped(n: usize) -> String {
 }
 
 /// An optional time with two digits, or a dash.
-pub fn seconds(value: Option<f64>) -> String {
+pub(super) fn seconds(value: Option<f64>) -> String {
     value.map_or_else(|| "-".to_owned(), |s| format!("{s:.2}"))
 }

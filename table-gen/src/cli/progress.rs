@@ -14,7 +14,7 @@ const QUIET: Duration = Duration::from_secs(1);
 static INTERRUPTED: AtomicBool = AtomicBool::new(false);
 
 /// From now on Ctrl-C interrupts work at its next checkpoint instead of killing the process: nothing half-written stays.
-pub fn catch_interrupts() {
+pub(super) fn catch_interrupts() {
     // A second call, or a system without signals, leaves the default behaviour.
     let _ = ctrlc::set_handler(|| {
         if INTERRUPTED.swap(true, Ordering::SeqCst) {
@@ -25,12 +25,12 @@ pub fn catch_interrupts() {
 }
 
 /// Whether Ctrl-C was pressed.
-pub fn interrupted() -> bool {
+pub(super) fn interrupted() -> bool {
     INTERRUPTED.load(Ordering::SeqCst)
 }
 
 /// Shows the sweeps of a game.
-pub struct GameProgress {
+pub(super) struct GameProgress {
     name: &'static str,
     bar: ProgressBar,
     start: Instant,
@@ -38,7 +38,7 @@ pub struct GameProgress {
 
 impl GameProgress {
     /// Progress of the game of a law.
-    pub fn new(name: &'static str) -> Self {
+    pub(super) fn new(name: &'static str) -> Self {
         let bar = ProgressBar::with_draw_target(None, ProgressDrawTarget::hidden());
         if let Ok(style) = ProgressStyle::with_template("{spinner} {msg}") {
             bar.set_style(style);
@@ -77,6 +77,24 @@ impl Drop for GameProgress {
 }
 
 /// An observer for a game, as synthesis asks for.
-pub fn watch(name: &'static str) -> Box<dyn Watch> {
+pub(super) fn watch(name: &'static str) -> Box<dyn Watch> {
     Box::new(GameProgress::new(name))
+}
+
+/// Shows the share of a piece of work that is done; the function it returns answers whether to go on.
+pub(super) fn share(name: &'static str) -> impl Fn(f64) -> bool {
+    let progress = GameProgress::new(name);
+    move |done| {
+        let elapsed = progress.start.elapsed();
+        if elapsed > QUIET {
+            progress.bar.set_draw_target(ProgressDrawTarget::stderr());
+            progress.bar.set_message(format!(
+                "{name}: {:.0} %, {:.0} s",
+                100.0 * done,
+                elapsed.as_secs_f64()
+            ));
+            progress.bar.tick();
+        }
+        !interrupted()
+    }
 }

@@ -12,7 +12,7 @@ use crate::simulation::trajectory::PhaseSpan;
 
 /// Arguments of `replay`.
 #[derive(Debug, clap::Args)]
-pub struct ReplayArgs {
+pub(super) struct ReplayArgs {
     /// Recorded frequency: CSV with columns dtm,f or utc_time,frequency_hz
     #[arg(value_name = "TRACE.csv")]
     trace: PathBuf,
@@ -49,7 +49,7 @@ struct ReplayReport<'r> {
 }
 
 /// Runs the command.
-pub fn run(args: &ReplayArgs) -> Result<(), Failure> {
+pub(super) fn run(args: &ReplayArgs) -> Result<(), Failure> {
     let spec = args.overrides.load(&args.spec)?;
     if let Some(longest) = args.fill_gaps
         && !(longest.is_finite() && longest > 0.0)

@@ -34,7 +34,7 @@ enum ControllerArg {
 
 /// Arguments of `simulate`.
 #[derive(Debug, clap::Args)]
-pub struct SimulateArgs {
+pub(super) struct SimulateArgs {
     #[command(flatten)]
     spec: SpecArgs,
     #[command(flatten)]
@@ -75,7 +75,7 @@ pub struct SimulateArgs {
 
 /// What is uncertain in a run.
 #[derive(Debug, Clone, Copy, clap::Args)]
-pub struct Chances {
+pub(super) struct Chances {
     /// Lost infeed [GW]; default: the middle of the spec's band. With --runs a band LOW,HIGH; default: the spec's
     #[arg(long, value_name = "GW", allow_hyphen_values = true)]
     pub(super) loss_gw: Option<Band>,
@@ -157,7 +157,7 @@ struct SimulateReport<'r> {
 }
 
 /// Runs the command.
-pub fn run(args: &SimulateArgs) -> Result<(), Failure> {
+pub(super) fn run(args: &SimulateArgs) -> Result<(), Failure> {
     let spec = args.load()?;
     if args.runs.is_some() && args.controller != ControllerArg::Symbolic {
         return Err(Failure::BadInput(
@@ -257,7 +257,7 @@ fn symbolic(
 }
 
 /// Time and absolute frequency of a run's samples.
-pub fn frequency(run: &Run) -> Vec<(f64, f64)> {
+pub(super) fn frequency(run: &Run) -> Vec<(f64, f64)> {
     let point = |sample: &crate::simulation::trajectory::Sample| {
         (sample.time_s, NOMINAL_HZ + sample.state[0])
     };
@@ -265,7 +265,7 @@ pub fn frequency(run: &Run) -> Vec<(f64, f64)> {
 }
 
 /// Levels that a plot marks: the lower ends of I1 and I2, and the containment \[Hz\].
-pub fn levels_hz(spec: &Spec) -> Vec<f64> {
+pub(super) fn levels_hz(spec: &Spec) -> Vec<f64> {
     let requirements = &spec.requirements;
     [requirements.outer_hz[0], requirements.inner_hz[0]]
         .into_iter()
@@ -289,7 +289,7 @@ fn write_csv(path: &std::path::Path, run: &Run) -> Result<(), Failure> {
 }
 
 /// A summary as a table on stdout.
-pub fn summary(summary: &Summary) {
+pub(super) fn summary(summary: &Summary) {
     let mut table = output::table(&["measure", "value"]);
     let yes = |flag: bool| if flag { "yes" } else { "no" }.to_owned();
     let rows = [
@@ -337,7 +337,7 @@ pub fn summary(summary: &Summary) {
 }
 
 /// Phases as a table on stdout.
-pub fn phases(phases: &[PhaseSpan]) {
+pub(super) fn phases(phases: &[PhaseSpan]) {
     if phases.is_empty() {
         return;
     }

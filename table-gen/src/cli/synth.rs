@@ -9,7 +9,7 @@ use crate::usage;
 
 /// Arguments of `synth`.
 #[derive(Debug, clap::Args)]
-pub struct SynthArgs {
+pub(super) struct SynthArgs {
     #[command(flatten)]
     spec: SpecArgs,
     #[command(flatten)]
@@ -21,7 +21,7 @@ pub struct SynthArgs {
 
 /// One game, as JSON and the table show it.
 #[derive(Debug, Clone, Serialize)]
-pub struct ProblemReport {
+pub(super) struct ProblemReport {
     name: &'static str,
     target_cells: usize,
     winning_cells: usize,
@@ -33,7 +33,7 @@ pub struct ProblemReport {
 
 /// The answer of `synth`; `build` repeats it.
 #[derive(Debug, Clone, Serialize)]
-pub struct SynthReport {
+pub(super) struct SynthReport {
     spec: String,
     cells: u32,
     inputs: usize,
@@ -46,7 +46,7 @@ pub struct SynthReport {
 
 impl SynthReport {
     /// The report of a synthesis.
-    pub fn new(spec: &Spec, synthesis: &Synthesis) -> Self {
+    pub(super) fn new(spec: &Spec, synthesis: &Synthesis) -> Self {
         let laws = [
             ("C1", Some(&synthesis.c1)),
             ("C2", synthesis.c2.as_ref()),
@@ -67,7 +67,7 @@ impl SynthReport {
     }
 
     /// The same as a table on stdout.
-    pub fn print(&self) {
+    pub(super) fn print(&self) {
         output::line(format_args!(
             "{}: {} cells, {} inputs",
             self.spec,
@@ -122,7 +122,7 @@ fn problem(name: &'static str, law: &SolvedLaw) -> ProblemReport {
 }
 
 /// Runs the command.
-pub fn run(args: &SynthArgs) -> Result<(), Failure> {
+pub(super) fn run(args: &SynthArgs) -> Result<(), Failure> {
     let spec = args.spec.load()?;
     progress::catch_interrupts();
     let synthesis = synthesis::synthesise(&spec, &progress::watch)?;

@@ -1,0 +1,4 @@
+//! What the cross-crate tests share.
+#![forbid(unsafe_code)]
+
+pub mod reference;
