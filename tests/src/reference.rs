@@ -48,7 +48,7 @@ impl SlowGame {
         let n = self.axes.len();
         let phi = (&self.a * self.period).exp();
         let steps = 4000;
-        let h = self.period / steps as f64;
+        let h = self.period / f64::from(steps);
         let half = (&self.a * (0.5 * h)).exp();
         let step = (&self.a * h).exp();
         let mut y = &half * &self.b;

@@ -1,4 +1,5 @@
 //! The plant and the baseline against numbers that three independent programs agree on.
+#![allow(clippy::unwrap_used, reason = "a test that cannot go on fails")]
 
 use table_gen::simulation::baseline;
 use table_gen::simulation::scenario::Scenario;

@@ -1,4 +1,5 @@
 //! The firmware's own loop on emitted bytes, against the plant.
+#![allow(clippy::unwrap_used, reason = "a test that cannot go on fails")]
 
 use firmware::control_loop::{ControlLoop, Source};
 use firmware::droop::Droop;

@@ -11,7 +11,7 @@ const SIZE: (u32, u32) = (960, 400);
 /// Height of the legend's row \[px\].
 const LEGEND_PX: i32 = 24;
 /// Mean width of a character of the labels \[px\]: for the legend's spacing alone.
-const CHARACTER_PX: i32 = 7;
+const CHARACTER_PX: i32 = 6;
 /// Size of labels \[px\].
 const LABEL_PX: i32 = 13;
 
@@ -61,6 +61,7 @@ fn draw(figure: &Figure, root: &Root<'_>) -> Result<(), String> {
     let fail = |error: DrawingAreaErrorKind<std::io::Error>| error.to_string();
     let mut chart = ChartBuilder::on(&plot)
         .margin(6)
+        .margin_right(24)
         .x_label_area_size(38)
         .y_label_area_size(58)
         .build_cartesian_2d(start..end, low..high)
@@ -83,6 +84,7 @@ fn draw(figure: &Figure, root: &Root<'_>) -> Result<(), String> {
         .y_desc(figure.value_label)
         .axis_desc_style(label(Colour::Ink))
         .x_labels(13)
+        .x_label_formatter(&|time| format!("{time:.0}"))
         .y_labels(9)
         .draw()
         .map_err(fail)?;

@@ -90,10 +90,10 @@ impl Closed<'_> {
             // The order in which threads find cells must not show.
             next.sort_unstable();
             for (kind, cell, what) in failed {
-                if !tally.violations.contains_key(&kind) {
+                tally.violations.entry(kind).or_insert_with(|| {
                     let path = self.path(&layers, cell, seed_path);
-                    tally.violations.insert(kind, Found { what, path });
-                }
+                    Found { what, path }
+                });
             }
             layers.push(next);
         }

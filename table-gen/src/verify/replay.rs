@@ -163,8 +163,9 @@ impl<'a> Replay<'a> {
 
 fn plain(flow: &Flow<STATES>) -> ([[f64; STATES]; STATES], [f64; STATES]) {
     (
-        flow.phi.map(|row| row.map(|entry| entry.mid())),
-        flow.gamma.map(|entry| entry.mid()),
+        flow.phi
+            .map(|row| row.map(super::super::interval::Interval::mid)),
+        flow.gamma.map(super::super::interval::Interval::mid),
     )
 }
 
