@@ -14,7 +14,8 @@
 //! | [`pipeline`] | a spec | a table, the whole way |
 //! | [`simulation`] | a table, or a baseline | the grid's frequency in time |
 //! | [`replay`] | a recorded frequency | what the firmware would have done |
-//! | [`boost_converter`] | a second plant: the engine knows none | |
+//! | [`boost_converter`] | a second plant: the engine knows none |
+//! | [`report`] | runs and findings | one HTML page and its figures |
 //! | [`cli`] | arguments | all of the above |
 #![forbid(unsafe_code)]
 
@@ -29,6 +30,7 @@ pub mod interval;
 pub mod pipeline;
 pub mod plant;
 pub mod replay;
+pub mod report;
 pub mod simulation;
 pub mod spec;
 pub mod synthesis;
