@@ -1,6 +1,7 @@
 //! The host side of Holdfast.
 #![forbid(unsafe_code)]
 pub mod abstraction;
+pub mod compress;
 pub mod flow;
 pub mod game;
 pub mod grid_shape;

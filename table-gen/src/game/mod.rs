@@ -21,6 +21,7 @@ pub mod bitset;
 pub mod blocks;
 pub mod inclusion;
 pub mod reach;
+pub mod restricted;
 pub mod safety;
 
 use bitset::BitSet;
