@@ -4,7 +4,7 @@
 //!
 //! | phase | in force | examined |
 //! |---|---|---|
-//! | No control | from the event until f leaves I1; no charger responds | every tick |
+//! | No control | until f falls below I1; no charger responds | every tick |
 //! | C1 | f outside I1 | every period, counted from the switch |
 //! | C2 | f in I1, outside I2 | every period, counted from the switch |
 //! | Fixed | f in I2; the last participation is held | every tick |
@@ -20,7 +20,7 @@ use crate::units::State;
 /// The law in force.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum Phase {
-    /// Inside I1 since the event: no charger responds.
+    /// Not below I1 yet: no charger responds.
     NoControl,
     /// The law that reaches I1.
     C1,
@@ -67,7 +67,10 @@ impl PhaseState {
     pub fn step(self, table: &TableView<'_>, state: State) -> (Self, Step) {
         let header = table.header();
         match self.phase {
-            Phase::NoControl if header.outer.contains(state) => (self, Step::Level(self.level)),
+            // Chargers can only answer a fall: above I1 there is nothing to do before the event.
+            Phase::NoControl if state.frequency_uhz() >= header.outer.low_uhz => {
+                (self, Step::Level(self.level))
+            }
             Phase::Fixed if header.inner.contains(state) => (self, Step::Level(self.level)),
             Phase::C1 | Phase::C2 | Phase::Hold if self.ticks_left > 0 => {
                 let ticks_left = self.ticks_left - 1;

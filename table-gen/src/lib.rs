@@ -1,12 +1,35 @@
-//! The host side of Holdfast.
+//! The host side of Holdfast: from a specification to proven flash bytes, and the grid to try them on.
+//!
+//! The modules in the order of the data:
+//!
+//! | module | turns | into |
+//! |---|---|---|
+//! | [`spec`] | a TOML document | checked numbers |
+//! | [`plant`] | parameters | the equations, once, for plain numbers and intervals |
+//! | [`interval`], [`flow`] | the equations | enclosures of the flow over a time |
+//! | [`grid_shape`], [`abstraction`] | plant and grid | boxes of successor cells |
+//! | [`game`] | an abstraction and a target | allowed inputs and ranks |
+//! | [`synthesis`] | a spec | the laws C1, C2, Hold |
+//! | [`compress`] | the laws' freedom | small trees and domains |
+//! | [`emit`] | laws | the bytes of a table |
+//! | [`pipeline`] | a spec | a table, the whole way |
+//! | [`simulation`] | a table, or a baseline | the grid's frequency in time |
+//! | [`replay`] | a recorded frequency | what the firmware would have done |
+//! | [`cli`] | arguments | all of the above |
 #![forbid(unsafe_code)]
+
 pub mod abstraction;
+pub mod cli;
 pub mod compress;
+pub mod emit;
 pub mod flow;
 pub mod game;
 pub mod grid_shape;
 pub mod interval;
+pub mod pipeline;
 pub mod plant;
+pub mod replay;
+pub mod simulation;
 pub mod spec;
 pub mod synthesis;
 pub mod usage;

@@ -14,10 +14,13 @@
 use std::time::Instant;
 
 use firmware::grid::{Grid, GridError};
+use firmware::units::AXIS_F;
 
 use crate::abstraction::Abstraction;
 use crate::abstraction::affine::{AbstractionError, AffineAbstraction, AffineInput, Growth};
+use crate::abstraction::tube::TubeGuard;
 use crate::game::bitset::BitSet;
+use crate::game::guard::Guard;
 use crate::game::{GameError, Solution, Watch, reach::reach, safety::safety};
 use crate::grid_shape::GridShape;
 use crate::interval::Interval;
@@ -126,6 +129,23 @@ pub fn measurement_micro(spec: &Spec) -> [f64; STATES] {
         .map(|e| if e == 0.0 { 0.0 } else { (e * MICRO).next_up() })
 }
 
+/// The inputs of a spec as drives of its plant.
+fn inputs(spec: &Spec) -> Vec<AffineInput<STATES>> {
+    let (a, b) = GridPlant::new(spec).matrices();
+    (0..spec.input.levels())
+        .map(|level| AffineInput {
+            a,
+            b,
+            drive: net_power(spec, level),
+        })
+        .collect()
+}
+
+/// The period \[s\], a whole number of milliseconds.
+fn period_s(spec: &Spec) -> f64 {
+    f64::from(spec.sampling.period_ms()) / 1000.0
+}
+
 /// The abstraction of a spec's plant on its grid.
 ///
 /// # Errors
@@ -134,27 +154,73 @@ pub fn abstraction(
     spec: &Spec,
     grid: &Grid,
 ) -> Result<AffineAbstraction<STATES>, AbstractionError> {
-    let (a, b) = GridPlant::new(spec).matrices();
-    let inputs: Vec<_> = (0..spec.input.levels())
-        .map(|level| AffineInput {
-            a,
-            b,
-            drive: net_power(spec, level),
-        })
-        .collect();
     let growth = match spec.method.successor {
         Successor::GrowthBound => Growth::GrowthBound,
         Successor::ExactLinear => Growth::ExactLinear,
     };
-    // The period in seconds is a whole number of milliseconds.
-    let period_s = f64::from(spec.sampling.period_ms()) / 1000.0;
     AffineAbstraction::new(
         grid_shape(grid),
-        &inputs,
-        period_s,
+        &inputs(spec),
+        period_s(spec),
         growth,
         measurement_micro(spec),
     )
+}
+
+/// The guard of a band \[µHz\], if the spec asks for the time between the samples and the band has an end.
+fn between_samples(spec: &Spec, grid: &Grid, (low, high): (f64, f64)) -> OptionalGuard {
+    let bounded = low.is_finite() || high.is_finite();
+    if !(spec.method.between_samples && bounded) {
+        return OptionalGuard(None);
+    }
+    OptionalGuard(Some(TubeGuard::new(
+        &grid_shape(grid),
+        &inputs(spec),
+        period_s(spec),
+        measurement_micro(spec),
+        AXIS_F,
+        (low, high),
+    )))
+}
+
+/// The guard of C1 and C2: f stays above containment between the samples too, if the spec asks for it.
+pub fn containment_guard(spec: &Spec, grid: &Grid) -> OptionalGuard {
+    let low = spec.requirements.containment_hz.map(containment_micro);
+    between_samples(
+        spec,
+        grid,
+        (low.unwrap_or(f64::NEG_INFINITY), f64::INFINITY),
+    )
+}
+
+/// The guard of Hold: f stays in I2 between the samples too, if the spec asks for it.
+pub fn stay_guard(spec: &Spec, grid: &Grid) -> OptionalGuard {
+    let [low, high] = spec.requirements.inner_micro().map(f64::from);
+    between_samples(spec, grid, (low, high))
+}
+
+/// A guard, or none.
+#[derive(Debug, Clone)]
+pub struct OptionalGuard(Option<TubeGuard<STATES>>);
+
+impl Guard<STATES> for OptionalGuard {
+    fn permitted(&self, cell: [u32; STATES], inputs: u32) -> u32 {
+        match &self.0 {
+            None => inputs,
+            Some(guard) => guard.permitted(cell, inputs),
+        }
+    }
+}
+
+/// Containment \[µHz\], rounded up if it is no whole number of them.
+fn containment_micro(hz: f64) -> f64 {
+    let micro = hz * MICRO;
+    // The product of a decimal and 1e6 may miss a whole number by a rounding; a thousandth of a µHz decides.
+    if (micro - micro.round()).abs() < 1e-3 {
+        micro.round()
+    } else {
+        micro.ceil()
+    }
 }
 
 /// Cells whose whole frequency interval, widened by the measurement error, lies in a band \[µHz\].
@@ -193,28 +259,25 @@ pub fn synthesise<'w>(
     let grid = device_grid(spec).map_err(SynthesisError::Grid)?;
     let before = usage::cpu_s();
     let abstraction = abstraction(spec, &grid)?;
+    let requirements = &spec.requirements;
+    let containment = requirements.containment_hz.map(containment_micro);
+    let contained = containment_guard(spec, &grid);
     let abstraction_cpu_s = usage::cpu_s() - before;
     let error = measurement_micro(spec)[0];
-    let requirements = &spec.requirements;
     let [outer_low, outer_high] = requirements.outer_micro().map(f64::from);
     let [inner_low, inner_high] = requirements.inner_micro().map(f64::from);
     let outer = cells_within(&grid, outer_low, outer_high, error);
     let inner = cells_within(&grid, inner_low, inner_high, error);
-    let avoid = match requirements.containment_hz {
+    let avoid = match containment {
         None => BitSet::new(outer.len()),
-        Some(hz) => {
-            // A cell counts as contained only if its lower end, less the error, is at or above the limit.
-            let limit = (hz * MICRO).next_up();
-            let limit = if hz * MICRO == (hz * MICRO).round() {
-                hz * MICRO
-            } else {
-                limit
-            };
-            by_frequency(&grid, |low, _| low - error < limit)
-        }
+        // A cell counts as contained only if its lower end, less the error, is at or above the limit.
+        Some(limit) => by_frequency(&grid, |low, _| low - error < limit),
     };
     let hold = if requirements.stay {
-        let law = solve("Hold", watch, |watch| safety(&abstraction, &inner, watch))?;
+        let stay = stay_guard(spec, &grid);
+        let law = solve("Hold", watch, |watch| {
+            safety(&abstraction, &inner, &stay, watch)
+        })?;
         if law.solution.winning == 0 {
             return Err(SynthesisError::NoController {
                 game: "Hold",
@@ -233,7 +296,7 @@ pub fn synthesise<'w>(
     let same = requirements.outer_micro() == requirements.inner_micro();
     let play = |name, target: &BitSet| {
         let law = solve(name, watch, |watch| {
-            reach(&abstraction, target, &avoid, watch)
+            reach(&abstraction, target, &avoid, &contained, watch)
         })?;
         if law.solution.winning == 0 {
             return Err(SynthesisError::NoController {

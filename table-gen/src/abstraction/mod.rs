@@ -6,6 +6,7 @@
 
 pub mod affine;
 pub mod growth;
+pub mod tube;
 
 use crate::grid_shape::GridShape;
 

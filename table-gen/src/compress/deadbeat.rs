@@ -13,6 +13,7 @@ use firmware::table::{AffineFunction, LEVEL_FRACTION_BITS};
 
 use crate::flow::Flow;
 use crate::grid_shape::GridShape;
+use crate::interval::Interval;
 use crate::plant::{GridPlant, STATES};
 use crate::spec::Spec;
 use crate::synthesis::{MICRO, net_power};
@@ -35,7 +36,7 @@ pub fn candidates(
     let mut found = Vec::new();
     for periods in PERIODS {
         let flow = Flow::over(&a, &b, periods * spec.sampling.period_s);
-        let phi = flow.phi[0].map(|entry| entry.mid());
+        let phi = flow.phi[0].map(Interval::mid);
         let gamma = flow.gamma[0].mid();
         for press in PRESSES {
             for at in 0..SET_POINTS {

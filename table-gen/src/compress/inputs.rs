@@ -15,9 +15,10 @@ use super::tree::{Tree, build};
 use crate::abstraction::Abstraction;
 use crate::abstraction::affine::AffineAbstraction;
 use crate::game::bitset::BitSet;
-use crate::game::restricted::reach_restricted;
-use crate::game::{NOT_WON, Solution};
+use crate::game::restricted::{Chosen, Restricted};
+use crate::game::{GameError, NOT_WON, Solution, Watch};
 use crate::plant::STATES;
+use crate::synthesis::OptionalGuard;
 
 /// A law's inputs, compressed.
 #[derive(Debug, Clone)]
@@ -33,7 +34,6 @@ pub struct CompressedInputs {
 }
 
 /// What the inputs are compressed for.
-#[derive(Debug)]
 pub struct InputsTask<'t> {
     /// The abstraction.
     pub abstraction: &'t AffineAbstraction<STATES>,
@@ -41,6 +41,10 @@ pub struct InputsTask<'t> {
     pub target: Option<&'t BitSet>,
     /// Cells to answer for.
     pub domain: &'t BitSet,
+    /// Forbids inputs of the game.
+    pub guard: &'t OptionalGuard,
+    /// Told of every sweep of a game.
+    pub watch: &'t dyn Watch,
     /// The game's masks on the domain.
     pub solution: &'t Solution,
     /// Affine laws to choose from.
@@ -68,14 +72,13 @@ impl InputsTask<'_> {
         if self.rounds == 0 {
             return Ok(best);
         }
-        let shape = self.abstraction.shape();
         let narrow = |cell: [u32; STATES]| cell.map(|i| i as u16);
         // The first law wins what it can alone, the others help where it cannot go on.
         let first = |_: usize, cell| match laws.laws.first() {
             Some(law) => 1u32 << law.level(firmware::grid::Cell(narrow(cell)), levels),
             None => 0,
         };
-        let mut solution = reach_restricted(self.abstraction, target, self.domain, &first, true)?;
+        let mut solution = self.reach(target, &first, true)?;
         let laws = choose_laws(self.candidates, levels, &self.cells(&solution));
         for _ in 0..self.rounds {
             let next = self.attempt(&laws, &solution, 0)?;
@@ -84,7 +87,7 @@ impl InputsTask<'_> {
                 let leaf = next.tree.leaf(firmware::grid::Cell(cell));
                 1u32 << next.laws.level(leaf, cell)
             };
-            let again = reach_restricted(self.abstraction, target, self.domain, &choice, false)?;
+            let again = self.reach(target, &choice, false)?;
             let steps = self.worst_rank(&again);
             if next.bytes.len() < best.bytes.len() {
                 best = CompressedInputs { steps, ..next };
@@ -94,8 +97,23 @@ impl InputsTask<'_> {
             }
             solution = again;
         }
-        debug_assert_eq!(shape.cells(), solution.ranks.len());
         Ok(best)
+    }
+
+    fn reach(
+        &self,
+        target: &BitSet,
+        chosen: &Chosen<'_, STATES>,
+        last_resort: bool,
+    ) -> Result<Solution, GameError> {
+        let game = Restricted {
+            abstraction: self.abstraction,
+            target,
+            domain: self.domain,
+            guard: self.guard,
+            watch: self.watch,
+        };
+        game.reach(chosen, last_resort)
     }
 
     /// Cells of the domain with their allowed inputs.

@@ -9,6 +9,7 @@
 //! | [`inputs`] | the whole of it for a law: laws, ranks, tree, ranks by the tree, … |
 //! | [`membership`] | the domain part |
 //! | [`encode`] | trees as bytes |
+//! | [`recheck`] | the emitted bytes, played again |
 //!
 //! A law's table part is sound by itself: every input that it gives inside its domain is one that the game allows there.
 
@@ -18,15 +19,18 @@ pub mod encode;
 pub mod inputs;
 pub mod law_set;
 pub mod membership;
+pub mod recheck;
 pub mod split;
 pub mod tree;
 
-use firmware::table::{InputsKind, Law, LawEntry, TREE_DEPTH_MAX};
+use firmware::grid::Grid;
+use firmware::table::{InputsKind, LAWS, Law, LawEntry, TREE_DEPTH_MAX};
 
 use crate::abstraction::Abstraction;
 use crate::abstraction::affine::{AbstractionError, AffineAbstraction};
+use crate::emit::EncodedLaw;
 use crate::game::bitset::BitSet;
-use crate::game::{GameError, NOT_WON};
+use crate::game::{GameError, NOT_WON, Watch};
 use crate::plant::STATES;
 use crate::spec::Spec;
 use crate::synthesis::{self, SolvedLaw, Synthesis};
@@ -51,12 +55,10 @@ pub struct Options {
 pub struct CompressedLaw {
     /// Which law.
     pub law: Law,
-    /// The directory entry.
-    pub entry: LawEntry,
-    /// Domain part.
-    pub domain: Vec<u8>,
-    /// Inputs part.
-    pub inputs: Vec<u8>,
+    /// Directory entry, domain part and inputs part.
+    pub encoded: EncodedLaw,
+    /// Cells in which the law's game ends; none for Hold.
+    pub target: Option<BitSet>,
     /// Numbers for people.
     pub report: LawReport,
 }
@@ -83,6 +85,23 @@ pub struct CompressedLaws {
     pub laws: Vec<CompressedLaw>,
 }
 
+impl CompressedLaws {
+    /// Cells in which a law's game ends; none for Hold and for a law that the table does not hold.
+    pub fn target(&self, law: Law) -> Option<&BitSet> {
+        let law = self.laws.iter().find(|found| found.law == law)?;
+        law.target.as_ref()
+    }
+
+    /// The laws as `emit::assemble` takes them.
+    pub fn encoded(&self) -> [Option<EncodedLaw>; LAWS] {
+        let mut encoded = [None, None, None];
+        for law in &self.laws {
+            encoded[law.law as usize] = Some(law.encoded.clone());
+        }
+        encoded
+    }
+}
+
 /// Why compression has no result.
 #[derive(Debug, thiserror::Error)]
 pub enum CompressError {
@@ -101,16 +120,19 @@ pub enum CompressError {
 ///
 /// # Errors
 /// As [`CompressError`].
-pub fn compress(
+pub fn compress<'w>(
     spec: &Spec,
     synthesis: &Synthesis,
     options: &Options,
+    watch: &dyn Fn(&'static str) -> Box<dyn Watch + 'w>,
 ) -> Result<CompressedLaws, CompressError> {
     let abstraction = synthesis::abstraction(spec, &synthesis.grid)?;
     let context = Context {
         spec,
+        grid: &synthesis.grid,
         abstraction: &abstraction,
         options,
+        watch,
     };
     let outer = spec.requirements.outer_micro();
     let inner = spec.requirements.inner_micro();
@@ -123,13 +145,15 @@ pub fn compress(
     Ok(CompressedLaws { laws })
 }
 
-struct Context<'c> {
+struct Context<'c, 'w> {
     spec: &'c Spec,
+    grid: &'c Grid,
     abstraction: &'c AffineAbstraction<STATES>,
     options: &'c Options,
+    watch: &'c dyn Fn(&'static str) -> Box<dyn Watch + 'w>,
 }
 
-impl Context<'_> {
+impl Context<'_, '_> {
     fn law(
         &self,
         law: Law,
@@ -147,10 +171,22 @@ impl Context<'_> {
         } else {
             ROUNDS
         };
+        let guard = if safety {
+            synthesis::stay_guard(self.spec, self.grid)
+        } else {
+            synthesis::containment_guard(self.spec, self.grid)
+        };
+        let watch = (self.watch)(match law {
+            Law::C1 => "C1, ranked by the tree",
+            Law::C2 => "C2, ranked by the tree",
+            Law::Hold => "Hold, ranked by the tree",
+        });
         let inputs = InputsTask {
             abstraction: self.abstraction,
             target: target.as_ref(),
             domain: &domain,
+            guard: &guard,
+            watch: watch.as_ref(),
             solution,
             candidates: &candidates,
             depth_max: INPUTS_DEPTH_MAX,
@@ -167,8 +203,7 @@ impl Context<'_> {
         };
         Ok(CompressedLaw {
             law,
-            entry,
-            domain: part.bytes,
+            target,
             report: LawReport {
                 winning_cells: solution.winning,
                 domain_cells: domain.count(),
@@ -176,7 +211,11 @@ impl Context<'_> {
                 steps_minimal: worst(&solution.ranks),
                 steps: inputs.steps,
             },
-            inputs: inputs.bytes,
+            encoded: EncodedLaw {
+                entry,
+                domain: part.bytes,
+                inputs: inputs.bytes,
+            },
         })
     }
 }

@@ -27,7 +27,7 @@ impl BitSet {
         for word in &mut set.words[..bits / 64] {
             *word = u64::MAX;
         }
-        if bits % 64 != 0 {
+        if !bits.is_multiple_of(64) {
             set.words[bits / 64] = (1u64 << (bits % 64)) - 1;
         }
         set

@@ -27,7 +27,7 @@ impl<const D: usize> Blocks<D> {
     }
 
     /// Number of blocks.
-    pub fn len(&self) -> usize {
+    pub fn total(&self) -> usize {
         self.count.iter().map(|n| *n as usize).product()
     }
 

@@ -19,6 +19,7 @@
 
 pub mod bitset;
 pub mod blocks;
+pub mod guard;
 pub mod inclusion;
 pub mod reach;
 pub mod restricted;

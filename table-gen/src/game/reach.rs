@@ -4,6 +4,7 @@ use rayon::prelude::*;
 
 use super::bitset::BitSet;
 use super::blocks::{Blocks, Dirty, Filter};
+use super::guard::Guard;
 use super::inclusion::Inclusion;
 use super::{GameError, NOT_WON, SWEEPS_MAX, Solution, Sweep, Watch};
 use crate::abstraction::Abstraction;
@@ -21,7 +22,7 @@ struct Won {
 }
 
 /// Solves: from every winning cell, whatever the successor within its box, `target` is reached and `avoid` never
-/// entered. Target cells have rank 0 and no inputs; the inputs of a winning cell are those whose box lies in the
+/// entered, and no input is used that `guard` forbids. Target cells have rank 0 and no inputs; the inputs of a winning cell are those whose box lies in the
 /// cells won before it, so that the rank falls with every step.
 ///
 /// # Errors
@@ -30,6 +31,7 @@ pub fn reach<const D: usize, A: Abstraction<D>>(
     abstraction: &A,
     target: &BitSet,
     avoid: &BitSet,
+    guard: &impl Guard<D>,
     watch: &dyn Watch,
 ) -> Result<Solution, GameError> {
     let cells = abstraction.shape().cells();
@@ -61,12 +63,12 @@ pub fn reach<const D: usize, A: Abstraction<D>>(
         };
         let filter = Filter::new(abstraction, &won, dirty, true);
         let inclusion = Inclusion::new(abstraction.shape(), &won, abstraction.extents());
-        let tasks = blocks.len().div_ceil(BLOCKS_PER_TASK);
+        let tasks = blocks.total().div_ceil(BLOCKS_PER_TASK);
         let found: Vec<Won> = (0..tasks)
             .into_par_iter()
             .map(|task| {
                 let first = task * BLOCKS_PER_TASK;
-                let last = (first + BLOCKS_PER_TASK).min(blocks.len());
+                let last = (first + BLOCKS_PER_TASK).min(blocks.total());
                 let mut out = Won::default();
                 for block in first..last {
                     if open[block] == 0 {
@@ -82,7 +84,10 @@ pub fn reach<const D: usize, A: Abstraction<D>>(
                         if ranks[index] != NOT_WON || avoid.contains(index) {
                             return;
                         }
-                        let mask = included(abstraction, &inclusion, cell, inputs);
+                        let mut mask = included(abstraction, &inclusion, cell, inputs);
+                        if mask != 0 {
+                            mask = guard.permitted(cell, mask);
+                        }
                         if mask != 0 {
                             out.cells.push((index as u32, mask));
                         }
@@ -159,7 +164,7 @@ pub(super) fn open_cells<const D: usize>(
     blocks: &Blocks<D>,
     open: impl Fn(usize) -> bool + Sync,
 ) -> Vec<u16> {
-    (0..blocks.len())
+    (0..blocks.total())
         .into_par_iter()
         .map(|block| {
             let mut count = 0u16;

@@ -7,6 +7,7 @@ use rayon::prelude::*;
 
 use super::bitset::BitSet;
 use super::blocks::{Blocks, Dirty, Filter};
+use super::guard::Guard;
 use super::inclusion::Inclusion;
 use super::reach::{included, open_cells};
 use super::{GameError, NOT_WON, SWEEPS_MAX, Solution, Sweep, Watch};
@@ -27,13 +28,14 @@ struct Changes {
 }
 
 /// Solves: from every cell of the kernel, some input keeps every successor in the kernel; `safe` is where the kernel
-/// must lie. The masks of the solution hold every such input; ranks are 0 on the kernel.
+/// must lie, and no input is used that `guard` forbids. The masks of the solution hold every such input; ranks are 0 on the kernel.
 ///
 /// # Errors
 /// An empty safe set, an interruption by the watch, or too many sweeps. An empty kernel is a result.
 pub fn safety<const D: usize, A: Abstraction<D>>(
     abstraction: &A,
     safe: &BitSet,
+    guard: &impl Guard<D>,
     watch: &dyn Watch,
 ) -> Result<Solution, GameError> {
     let cells = abstraction.shape().cells();
@@ -43,14 +45,27 @@ pub fn safety<const D: usize, A: Abstraction<D>>(
     let blocks = Blocks::new(abstraction);
     let all = u32::MAX >> (32 - abstraction.inputs());
     let mut kernel = safe.clone();
+    // Cells without a permitted input are dead before the first sweep.
+    let permitted = tasks(&blocks, |block, out: &mut Changes| {
+        blocks.each_cell(blocks.first(block), |cell, index| {
+            if safe.contains(index) {
+                let mask = guard.permitted(cell, all);
+                out.masks.push((index as u32, mask));
+            }
+        });
+    });
     let mut masks = vec![0u32; cells];
-    for index in safe.iter() {
-        masks[index] = all;
+    for (index, mask) in permitted.iter().flat_map(|task| &task.masks) {
+        masks[*index as usize] = *mask;
+        if *mask == 0 {
+            kernel.remove(*index as usize);
+        }
     }
-    let mut alive = open_cells(&blocks, |index| safe.contains(index));
+    drop(permitted);
+    let mut alive = open_cells(&blocks, |index| kernel.contains(index));
     let mut changed = BitSet::new(cells);
     let mut sweeps = 0u16;
-    let mut left = safe.count();
+    let mut left = kernel.count();
     loop {
         if sweeps == SWEEPS_MAX {
             return Err(GameError::SweepLimit);
@@ -166,11 +181,11 @@ fn tasks<const D: usize>(
     blocks: &Blocks<D>,
     run: impl Fn(usize, &mut Changes) + Sync,
 ) -> Vec<Changes> {
-    (0..blocks.len().div_ceil(BLOCKS_PER_TASK))
+    (0..blocks.total().div_ceil(BLOCKS_PER_TASK))
         .into_par_iter()
         .map(|task| {
             let first = task * BLOCKS_PER_TASK;
-            let last = (first + BLOCKS_PER_TASK).min(blocks.len());
+            let last = (first + BLOCKS_PER_TASK).min(blocks.total());
             let mut out = Changes::default();
             for block in first..last {
                 run(block, &mut out);

@@ -20,7 +20,7 @@ pub struct UncertaintySpec {
     ///
     /// Unit: Hz, GW, GW, GW. Allowed: 4 numbers, each from 0 to 10. Default: [0, 0, 0, 0].
     pub measurement: [f64; 4],
-    /// Time from a decision to the fleet's power. FACTS, "Actuation delay".
+    /// Time from a decision to the fleet's power.
     ///
     /// Unit: s. Allowed: a number from 0 to 60. Default: 0.
     pub actuation_delay_s: f64,
@@ -54,7 +54,7 @@ pub struct InitialBox {
     pub upper: [f64; 4],
 }
 
-/// The claims to be proved (DESIGN section 4). Frequencies are deviations from 50 Hz.
+/// The claims to be proved. Frequencies are deviations from 50 Hz.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct RequirementsSpec {
@@ -147,7 +147,7 @@ impl Domain {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct TableSpec {
-    /// Which cells the table answers for. DESIGN section 3.
+    /// Which cells the table answers for.
     ///
     /// Unit: -. Allowed: "winning" or "reachable". Default: "winning".
     pub domain: Domain,

@@ -76,7 +76,7 @@ mod tests {
     use super::*;
 
     /// Computed outside this program, with Python's tomllib, struct and hashlib from the description above.
-    const PAPER_BI: &str = "4395fecf4e706849532ada94d3845c52";
+    const PAPER_BI: &str = "e251905c2a569ea317a82ee382ef8267";
 
     fn hex(bytes: &[u8]) -> String {
         bytes.iter().map(|byte| format!("{byte:02x}")).collect()
@@ -101,7 +101,7 @@ mod tests {
         assert!(text.contains("\nfleet.chargers=25000\n"));
         assert!(text.contains("\nuncertainty.loss_gw=4000000000000000,4000000000000000\n"));
         assert!(text.contains("\nrequirements.containment_hz=none\n"));
-        assert!(text.ends_with("\nmethod.successor=growth-bound\n"));
+        assert!(text.ends_with("\nmethod.between_samples=false\n"));
         assert_eq!(text.lines().count(), 1 + KEYS.len());
     }
 

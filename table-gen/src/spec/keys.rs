@@ -264,4 +264,6 @@ pub(super) const KEYS: &[Key] = &[
 
     row("method.successor", "-", Allowed::Choice(Successor::NAMES),
         "how the radius of a successor box is bounded", |s| KeyValue::Text(s.method.successor.name())),
+    row("method.between_samples", "-", Allowed::Flag,
+        "whether the games bound f between the samples too", |s| KeyValue::Flag(s.method.between_samples)),
 ];

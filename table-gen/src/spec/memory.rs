@@ -4,7 +4,7 @@ use std::fs;
 
 /// What synthesis holds for each cell: an estimate, above the mask of allowed inputs (4 bytes) and the rank.
 ///
-/// With the fixed part it gives 95 MB for the paper's 2.36 million cells, where FACTS measured 84 MB for a solver without
+/// With the fixed part it gives 95 MB for the paper's 2.36 million cells, where 84 MB were measured for a solver without
 /// stored transitions.
 const BYTES_PER_CELL: u64 = 12;
 

@@ -1,6 +1,6 @@
 //! The specification: everything that synthesis, verification and simulation take from the user.
 //!
-//! A spec is a TOML document (DESIGN section 3). On its way in it passes through, in this order:
+//! A spec is a TOML document. On its way in it passes through, in this order:
 //!
 //! | step | file | what can be wrong |
 //! |---|---|---|

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-/// Grid frequency dynamics (DESIGN section 4):
+/// Grid frequency dynamics:
 ///
 /// ```text
 /// f' = (p + P u - w - D f) / 2H          g' = (K f - g) / T_G
@@ -38,7 +38,7 @@ pub struct PlantSpec {
     ///
     /// Unit: GW/Hz. Allowed: a number from 0 to 1000. Default: 1.
     pub damping_gw_per_hz: f64,
-    /// Inertia H; 2H multiplies f', so 4 means 200 GVA s of kinetic energy at 50 Hz. Table I, FACTS.
+    /// Inertia H; 2H multiplies f', so 4 means 200 GVA s of kinetic energy at 50 Hz. Table I.
     ///
     /// Unit: GW s/Hz. Allowed: a number from 0.001 to 10000. Default: 4.
     pub inertia_gw_s_per_hz: f64,
@@ -111,7 +111,7 @@ impl Default for FleetSpec {
     }
 }
 
-/// The droop controller of the paper's comparison (FACTS): e = max(-f - deadband, 0) / R_ev, T_ev q' = e - D q,
+/// The droop controller of the paper's comparison: e = max(-f - deadband, 0) / R_ev, T_ev q' = e - D q,
 /// u = clamp(q, 0, 1), with the plant's D.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]

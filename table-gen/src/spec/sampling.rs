@@ -39,12 +39,12 @@ impl InputSpec {
     }
 }
 
-/// The clocks of the closed loop (DESIGN section 3).
+/// The clocks of the closed loop.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct SamplingSpec {
     /// Sampling time tau: in C1, C2 and Hold a decision is made and held for this long. Not printed in the paper;
-    /// 1.5 is where its bidirectional loop settles (FACTS). A whole number of `watch_s`.
+    /// 1.5 is where its bidirectional loop settles. A whole number of `watch_s`.
     ///
     /// Unit: s. Allowed: a number from 0.001 to 3600. Default: 1.5.
     pub period_s: f64,
@@ -98,7 +98,7 @@ pub(super) fn to_whole_ms(time_s: f64) -> Option<u32> {
     ((scaled - scaled.round()).abs() <= TOLERANCE_MS).then(|| to_ms(time_s))
 }
 
-/// How the radius of a successor box is bounded (DESIGN section 4).
+/// How the radius of a successor box is bounded.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Successor {
@@ -126,16 +126,22 @@ impl Successor {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct MethodSpec {
-    /// How the radius of a successor box is bounded. DESIGN section 4.
+    /// How the radius of a successor box is bounded.
     ///
     /// Unit: -. Allowed: "growth-bound" or "exact-linear". Default: "growth-bound".
     pub successor: Successor,
+    /// Whether the games themselves keep f above containment, and in I2 under Hold, between the samples too: inputs whose
+    /// reach tube over a period leaves the band are not allowed. The literature's games bound the samples alone.
+    ///
+    /// Unit: -. Allowed: true or false. Default: false.
+    pub between_samples: bool,
 }
 
 impl Default for MethodSpec {
     fn default() -> Self {
         Self {
             successor: Successor::GrowthBound,
+            between_samples: false,
         }
     }
 }

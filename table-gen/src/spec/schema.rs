@@ -7,7 +7,7 @@ use super::{
     SamplingSpec, TableSpec, UncertaintySpec,
 };
 
-/// A complete specification; one field per section of the TOML document (DESIGN section 3).
+/// A complete specification; one field per section of the TOML document.
 ///
 /// `Spec::default()` holds every key's documented default. A spec from [`Spec::load`] or [`Spec::from_toml`] has been
 /// validated; one that was put together or changed in code should pass [`Spec::validate`] before use.

@@ -150,6 +150,7 @@ fn the_hash_changes_with_every_key() {
         "requirements.horizon_s=none",
         "table.domain=reachable",
         "method.successor=exact-linear",
+        "method.between_samples=true",
     ];
     let changed: Vec<&str> = changes
         .iter()

@@ -1,0 +1,152 @@
+//! `build SPEC`: the whole way, and its files.
+//!
+//! Files are written into a temporary folder beside the target and moved when all of them are complete: an interruption
+//! or a failure leaves nothing behind.
+
+use std::path::{Path, PathBuf};
+
+use firmware::table::{Law, TableView};
+use serde::Serialize;
+
+use super::synth::SynthReport;
+use super::{Failure, OutputArgs, SpecArgs, output, progress, simulate};
+use crate::pipeline;
+use crate::simulation::closed_loop::{self, Estimator};
+use crate::simulation::monitor::Summary;
+use crate::simulation::scenario::Scenario;
+use crate::simulation::trajectory::PhaseSpan;
+use crate::synthesis;
+
+/// Arguments of `build`.
+#[derive(Debug, clap::Args)]
+pub(super) struct BuildArgs {
+    #[command(flatten)]
+    spec: SpecArgs,
+    #[command(flatten)]
+    output: OutputArgs,
+    /// Folder for the files; made if it does not exist
+    #[arg(long, value_name = "DIR", default_value = "out")]
+    out: PathBuf,
+}
+
+#[derive(Debug, Serialize)]
+struct EncodingReport {
+    phase: &'static str,
+    encoding: String,
+    bytes: u32,
+    entries: u32,
+    worst_visits: u16,
+}
+
+#[derive(Debug, Serialize)]
+struct BuildReport<'r> {
+    #[serde(flatten)]
+    synth: &'r SynthReport,
+    spec_hash: String,
+    table_bytes: usize,
+    encodings: Vec<EncodingReport>,
+    simulation: &'r Summary,
+    phases: &'r [PhaseSpan],
+}
+
+/// Runs the command.
+pub(super) fn run(args: &BuildArgs) -> Result<(), Failure> {
+    let spec = args.spec.load()?;
+    progress::catch_interrupts();
+    let synthesis = synthesis::synthesise(&spec, &progress::watch)?;
+    let synth = SynthReport::new(&spec, &synthesis);
+    let bytes = pipeline::emit(&spec, &synthesis).map_err(Failure::bad)?;
+    let table =
+        TableView::parse(&bytes).map_err(|error| Failure::BadInput(format!("{error:?}")))?;
+    let run = closed_loop::simulate(&spec, &table, &Scenario::of(&spec), Estimator::FullState)
+        .map_err(Failure::bad)?;
+    let report = BuildReport {
+        synth: &synth,
+        spec_hash: hex(&spec.hash()),
+        table_bytes: bytes.len(),
+        encodings: encodings(&table),
+        simulation: &run.summary,
+        phases: &run.phases,
+    };
+    let json = serde_json::to_string_pretty(&report).map_err(Failure::bad)?;
+    let files = [
+        ("table.bin", bytes.as_slice()),
+        ("build.json", json.as_bytes()),
+    ];
+    write_all(&args.out, &files)?;
+    if args.output.json {
+        output::line(json);
+        return Ok(());
+    }
+    synth.print();
+    print_encodings(&report);
+    simulate::summary(&run.summary);
+    simulate::phases(&run.phases);
+    output::line(format_args!("wrote {}", args.out.display()));
+    Ok(())
+}
+
+fn encodings(table: &TableView<'_>) -> Vec<EncodingReport> {
+    let laws = [(Law::C1, "C1"), (Law::C2, "C2"), (Law::Hold, "Hold")];
+    laws.into_iter()
+        .filter_map(|(law, phase)| {
+            let view = table.law(law)?;
+            let entry = table.header().laws[law as usize]?;
+            Some(EncodingReport {
+                phase,
+                encoding: format!("{:?}", entry.inputs_kind),
+                bytes: entry.domain_len + entry.inputs_len,
+                entries: view.encoding().entries(),
+                worst_visits: view.encoding().worst_visits(),
+            })
+        })
+        .collect()
+}
+
+fn print_encodings(report: &BuildReport<'_>) {
+    let mut table = output::table(&["law", "encoding", "bytes", "entries", "worst visits"]);
+    for row in &report.encodings {
+        table.add_row(vec![
+            row.phase.to_owned(),
+            row.encoding.clone(),
+            output::grouped(row.bytes as usize),
+            output::grouped(row.entries as usize),
+            row.worst_visits.to_string(),
+        ]);
+    }
+    output::line(table);
+    output::line(format_args!(
+        "table: {} bytes",
+        output::grouped(report.table_bytes)
+    ));
+}
+
+/// Lower-case hexadecimal.
+pub(super) fn hex(bytes: &[u8]) -> String {
+    bytes.iter().map(|byte| format!("{byte:02x}")).collect()
+}
+
+/// Writes all files or none.
+fn write_all(dir: &Path, files: &[(&str, &[u8])]) -> Result<(), Failure> {
+    let fail = |path: &Path, error: std::io::Error| {
+        Failure::BadInput(format!("{}: {error}", path.display()))
+    };
+    std::fs::create_dir_all(dir).map_err(|error| fail(dir, error))?;
+    // In the target's own folder, so that the moves stay on one file system.
+    let staging = tempfile::Builder::new()
+        .prefix(".partial-")
+        .tempdir_in(dir)
+        .map_err(|error| fail(dir, error))?;
+    for (name, bytes) in files {
+        let path = staging.path().join(name);
+        std::fs::write(&path, bytes).map_err(|error| fail(&path, error))?;
+    }
+    if progress::interrupted() {
+        return Err(Failure::No("interrupted; nothing was written".to_owned()));
+    }
+    for (name, _) in files {
+        let to = dir.join(name);
+        std::fs::rename(staging.path().join(name), &to).map_err(|error| fail(&to, error))?;
+    }
+    Ok(())
+}

@@ -1,0 +1,153 @@
+//! The commands of `table-gen`, one file each, and what they share.
+//!
+//! Exit codes: 0 done; 1 the answer is "no" (not verified, no controller exists, limit reached); 2 bad input.
+
+mod build;
+mod output;
+mod progress;
+mod replay;
+mod simulate;
+mod synth;
+
+use std::process::ExitCode;
+
+use clap::{Args, Parser, Subcommand};
+
+use crate::spec::{Spec, SpecError};
+
+/// Synthesises, compresses, verifies and simulates frequency-response tables for EV chargers.
+#[derive(Debug, Parser)]
+#[command(name = "table-gen", version, max_term_width = 110)]
+struct Cli {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    /// Synthesise, compress, check and simulate; writes the table and a report
+    Build(build::BuildArgs),
+    /// Solve the games alone: sizes, iterations, time, memory
+    Synth(synth::SynthArgs),
+    /// Run the grid with no response, the baseline droop or the firmware on a table
+    Simulate(simulate::SimulateArgs),
+    /// Run the firmware on a recorded frequency
+    Replay(replay::ReplayArgs),
+}
+
+/// The spec and what overrides it.
+#[derive(Debug, Clone, Args)]
+pub struct SpecArgs {
+    /// Name of a shipped spec, or path of a TOML file
+    #[arg(value_name = "SPEC")]
+    spec: String,
+    #[command(flatten)]
+    overrides: Overrides,
+}
+
+/// Options of every command that reads a spec.
+#[derive(Debug, Clone, Args)]
+pub struct Overrides {
+    /// Override a key of the spec, e.g. plant.inertia_gw_s_per_hz=3; KEY=none removes an optional one
+    #[arg(long = "set", value_name = "KEY=VALUE")]
+    set: Vec<String>,
+}
+
+/// Options of every command.
+#[derive(Debug, Clone, Copy, Args)]
+pub struct OutputArgs {
+    /// Print one JSON object on stdout and nothing else there
+    #[arg(long)]
+    json: bool,
+}
+
+impl SpecArgs {
+    /// Loads the spec.
+    fn load(&self) -> Result<Spec, Failure> {
+        self.overrides.load(&self.spec)
+    }
+}
+
+impl Overrides {
+    /// Loads a spec by name or path.
+    fn load(&self, spec: &str) -> Result<Spec, Failure> {
+        Ok(Spec::load(spec, &self.set)?)
+    }
+}
+
+/// Why a command did not end with 0.
+#[derive(Debug)]
+pub enum Failure {
+    /// The answer is "no".
+    No(String),
+    /// The input is bad, or a file cannot be read or written.
+    BadInput(String),
+}
+
+impl Failure {
+    /// Bad input, told by an error.
+    fn bad(error: impl std::fmt::Display) -> Self {
+        Self::BadInput(error.to_string())
+    }
+}
+
+impl From<SpecError> for Failure {
+    fn from(error: SpecError) -> Self {
+        Self::bad(error)
+    }
+}
+
+impl From<crate::pipeline::PipelineError> for Failure {
+    fn from(error: crate::pipeline::PipelineError) -> Self {
+        match error {
+            crate::pipeline::PipelineError::Synthesis(error) => error.into(),
+            other => Self::bad(other),
+        }
+    }
+}
+
+impl From<crate::synthesis::SynthesisError> for Failure {
+    fn from(error: crate::synthesis::SynthesisError) -> Self {
+        use crate::game::GameError;
+        use crate::synthesis::SynthesisError as E;
+        match &error {
+            E::Grid(_) | E::Abstraction(_) => Self::bad(error),
+            E::Game {
+                error: GameError::EmptyTarget,
+                ..
+            } => Self::bad(error),
+            E::Game { .. } | E::NoController { .. } => Self::No(error.to_string()),
+        }
+    }
+}
+
+/// Runs the command line of this process.
+pub fn run() -> ExitCode {
+    let cli = match Cli::try_parse() {
+        Ok(cli) => cli,
+        Err(error) => {
+            // clap's own codes: 0 for help and version, 2 for bad usage.
+            let code = error.exit_code();
+            // Nothing is left to tell if the terminal is gone.
+            let _ = error.print();
+            return ExitCode::from(code as u8);
+        }
+    };
+    let result = match cli.command {
+        Command::Build(args) => build::run(&args),
+        Command::Synth(args) => synth::run(&args),
+        Command::Simulate(args) => simulate::run(&args),
+        Command::Replay(args) => replay::run(&args),
+    };
+    match result {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(Failure::No(reason)) => {
+            eprintln!("no: {reason}");
+            ExitCode::from(1)
+        }
+        Err(Failure::BadInput(reason)) => {
+            eprintln!("error: {reason}");
+            ExitCode::from(2)
+        }
+    }
+}

@@ -1,0 +1,128 @@
+//! `replay TRACE.csv SPEC`: the firmware on a recorded frequency.
+
+use std::path::PathBuf;
+
+use firmware::table::TableView;
+use serde::Serialize;
+
+use super::{Failure, OutputArgs, Overrides, output, progress, simulate};
+use crate::pipeline;
+use crate::replay::{Replay, replay, trace};
+use crate::simulation::trajectory::PhaseSpan;
+
+/// Arguments of `replay`.
+#[derive(Debug, clap::Args)]
+pub(super) struct ReplayArgs {
+    /// Recorded frequency: CSV with columns dtm,f or utc_time,frequency_hz
+    #[arg(value_name = "TRACE.csv")]
+    trace: PathBuf,
+    /// Name of a shipped spec, or path of a TOML file
+    #[arg(value_name = "SPEC")]
+    spec: String,
+    #[command(flatten)]
+    overrides: Overrides,
+    #[command(flatten)]
+    output: OutputArgs,
+    /// Table to run, instead of synthesising one; it must be of this spec
+    #[arg(long, value_name = "FILE")]
+    table: Option<PathBuf>,
+    /// Hold the last sample over gaps up to this long [s]
+    #[arg(long, value_name = "SECONDS")]
+    fill_gaps: Option<f64>,
+    /// Write time, frequency and participation of every tick as CSV
+    #[arg(long, value_name = "FILE")]
+    csv: Option<PathBuf>,
+}
+
+#[derive(Debug, Serialize)]
+struct ReplayReport<'r> {
+    spec: &'r str,
+    start: &'r str,
+    samples: usize,
+    filled_s: f64,
+    onset_s: Option<f64>,
+    first_response_s: Option<f64>,
+    reaction_s: Option<f64>,
+    false_triggers: usize,
+    max_participation: f64,
+    phases: &'r [PhaseSpan],
+}
+
+/// Runs the command.
+pub(super) fn run(args: &ReplayArgs) -> Result<(), Failure> {
+    let spec = args.overrides.load(&args.spec)?;
+    if let Some(longest) = args.fill_gaps
+        && !(longest.is_finite() && longest > 0.0)
+    {
+        return Err(Failure::BadInput(format!(
+            "--fill-gaps = {longest} is out of range: finite, above 0 s"
+        )));
+    }
+    let trace = trace::read(&args.trace, args.fill_gaps).map_err(Failure::bad)?;
+    progress::catch_interrupts();
+    let bytes = pipeline::table_bytes(&spec, args.table.as_deref(), &progress::watch)?;
+    let table =
+        TableView::parse(&bytes).map_err(|error| Failure::BadInput(format!("{error:?}")))?;
+    let result = replay(&table, &trace)
+        .map_err(|error| Failure::BadInput(format!("the observer cannot be made: {error:?}")))?;
+    if let Some(path) = &args.csv {
+        write_csv(path, &result)?;
+    }
+    let reaction_s = match (result.onset_s, result.first_response_s) {
+        (Some(onset), Some(first)) => Some(first - onset),
+        _ => None,
+    };
+    let report = ReplayReport {
+        spec: &spec.name,
+        start: &trace.start,
+        samples: trace.samples.len(),
+        filled_s: trace.filled_s,
+        onset_s: result.onset_s,
+        first_response_s: result.first_response_s,
+        reaction_s,
+        false_triggers: result.false_triggers,
+        max_participation: result.max_participation,
+        phases: &result.phases,
+    };
+    if args.output.json {
+        return output::json(&report);
+    }
+    output::line(format_args!(
+        "{} samples from {}",
+        report.samples, report.start
+    ));
+    let mut rows = output::table(&["event", "value"]);
+    rows.add_row(["onset", &format!("{} s", output::seconds(report.onset_s))]);
+    rows.add_row([
+        "first response",
+        &format!("{} s", output::seconds(report.first_response_s)),
+    ]);
+    rows.add_row([
+        "reaction after onset",
+        &format!("{} s", output::seconds(reaction_s)),
+    ]);
+    rows.add_row([
+        "responses before the onset",
+        &report.false_triggers.to_string(),
+    ]);
+    rows.add_row([
+        "largest participation",
+        &format!("{:.3}", report.max_participation),
+    ]);
+    output::line(rows);
+    simulate::phases(&result.phases);
+    Ok(())
+}
+
+fn write_csv(path: &std::path::Path, result: &Replay) -> Result<(), Failure> {
+    let fail =
+        |error: &dyn std::fmt::Display| Failure::BadInput(format!("{}: {error}", path.display()));
+    let mut writer = csv::Writer::from_path(path).map_err(|e| fail(&e))?;
+    let columns = ["time_s", "frequency_hz", "participation"];
+    writer.write_record(columns).map_err(|e| fail(&e))?;
+    for sample in &result.samples {
+        let row = [sample.time_s, sample.frequency_hz, sample.participation];
+        writer.serialize(row).map_err(|e| fail(&e))?;
+    }
+    writer.flush().map_err(|e| fail(&e))
+}
