@@ -10,6 +10,7 @@
 //! | [`grid_shape`], [`abstraction`] | plant and grid | boxes of successor cells |
 //! | [`game`] | an abstraction and a target | allowed inputs and ranks |
 //! | [`synthesis`] | a spec | the laws C1, C2, Hold |
+//! | [`compress`] | the laws' freedom | small trees and domains |
 //! | [`emit`] | laws | the bytes of a table |
 //! | [`pipeline`] | a spec | a table, the whole way |
 //! | [`simulation`] | a table, or a baseline | the grid's frequency in time |
@@ -22,6 +23,7 @@
 pub mod abstraction;
 pub mod boost_converter;
 pub mod cli;
+pub mod compress;
 pub mod emit;
 pub mod flow;
 pub mod game;
