@@ -15,7 +15,7 @@
 //! | [`pipeline`] | a spec | a table, the whole way |
 //! | [`simulation`] | a table, or a baseline | the grid's frequency in time |
 //! | [`replay`] | a recorded frequency | what the firmware would have done |
-//! | [`boost_converter`] | a second plant: the engine knows none |
+//! | [`boost_converter`] | nothing | a second plant: the engine knows none |
 //! | [`report`] | runs and findings | one HTML page and its figures |
 //! | [`cli`] | arguments | all of the above |
 #![forbid(unsafe_code)]
