@@ -111,6 +111,7 @@ impl From<crate::pipeline::PipelineError> for Failure {
     fn from(error: crate::pipeline::PipelineError) -> Self {
         match error {
             crate::pipeline::PipelineError::Synthesis(error) => error.into(),
+            crate::pipeline::PipelineError::Compress(error) => Self::No(error.to_string()),
             other => Self::bad(other),
         }
     }
