@@ -107,7 +107,10 @@ impl Grid {
             }
             // The difference of two i32 with a >= b fits u32.
             let above = state.0[axis].wrapping_sub(self.lower_edge[axis]) as u32;
-            let index = above / self.width[axis];
+            // The width is not zero; said so that no panic is compiled in.
+            let Some(index) = above.checked_div(self.width[axis]) else {
+                return None;
+            };
             if index >= self.count[axis] as u32 {
                 return None;
             }

@@ -5,19 +5,30 @@
 //! | module | turns | into |
 //! |---|---|---|
 //! | [`units`] | the quantities of the grid model | integers in micro-units, the same on host and target |
+//! | [`frequency`] | bytes on a bus or timer ticks | a mains frequency that is believed, or a reason why not |
 //! | [`observer`] | measured frequency | the grid state (f, g, l, p) |
 //! | [`grid`] | a state | a cell, by the only quantiser there is |
 //! | [`table`] | a cell | an input level, or "outside" |
 //! | [`phase`] | state and table | the law in force: No control, C1, C2, Fixed, Hold |
 //! | [`droop`] | a frequency | the baseline participation, used as the fallback |
 //! | [`control_loop`] | one state a tick | one [`control_loop::Action`] a tick |
+//! | [`dispatch`] | a participation | this charger's current or power |
+//! | [`charger`] | one reading a tick | all of the above, with a defined [`fault`] state for whatever is missing |
+//! | [`telemetry`] | a tick's report | a frame on a serial line |
+//! | [`flash`] | a flash region | the table's bytes |
+//! | [`link`] | requests of a host | the answers of a charger: processor in the loop |
 //!
 //! Nothing here allocates, recurses or panics; nothing is `unsafe`. Everything that decides is integer arithmetic,
 //! so the host's abstraction and verifier, the simulator and the charger compute the same bits.
 #![no_std]
 #![forbid(unsafe_code)]
 
+#[cfg(test)]
+extern crate std;
+
 pub mod units;
+
+pub mod frequency;
 
 pub mod observer;
 
@@ -30,3 +41,15 @@ pub mod phase;
 pub mod droop;
 
 pub mod control_loop;
+
+pub mod dispatch;
+
+pub mod fault;
+
+pub mod charger;
+
+pub mod telemetry;
+
+pub mod flash;
+
+pub mod link;

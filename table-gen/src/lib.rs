@@ -15,10 +15,13 @@
 //! | [`pipeline`] | a spec | a table, the whole way |
 //! | [`simulation`] | a table, or a baseline | the grid's frequency in time |
 //! | [`replay`] | a recorded frequency | what the firmware would have done |
+//! | [`boost_converter`] | nothing | a second plant: the engine knows none |
+//! | [`report`] | runs and findings | one HTML page and its figures |
 //! | [`cli`] | arguments | all of the above |
 #![forbid(unsafe_code)]
 
 pub mod abstraction;
+pub mod boost_converter;
 pub mod cli;
 pub mod compress;
 pub mod emit;
@@ -29,7 +32,9 @@ pub mod interval;
 pub mod pipeline;
 pub mod plant;
 pub mod replay;
+pub mod report;
 pub mod simulation;
 pub mod spec;
 pub mod synthesis;
 pub mod usage;
+pub mod verify;

@@ -24,7 +24,7 @@
 //! | 172 | | blocks | |
 //! | end - 4 | 4 | CRC-32 of all before it | |
 
-use super::bytes::{array_at, i32_at, u16_at, u32_at};
+use super::bytes::{array_at, byte_at, i32_at, u16_at, u32_at};
 use super::{TableError, checksum};
 use crate::droop::Droop;
 use crate::grid::Grid;
@@ -272,8 +272,8 @@ impl Header {
 
     fn entry(bytes: &[u8], at: usize) -> Result<Option<LawEntry>, TableError> {
         let entry = LawEntry {
-            domain_kind: bytes[at],
-            inputs_kind: bytes[at + 1],
+            domain_kind: byte_at(bytes, at),
+            inputs_kind: byte_at(bytes, at + 1),
             worst_visits: u16_at(bytes, at + 2),
             domain_len: u32_at(bytes, at + 4),
             inputs_len: u32_at(bytes, at + 8),

@@ -156,7 +156,10 @@ impl<'t> TableView<'t> {
                 .and_then(|end| end.checked_add(entry.inputs_len as usize))
                 .filter(|end| *end <= bytes.len() - CRC_LEN)
                 .ok_or(bad(BlockError::OutOfImage))?;
-            let (domain, inputs) = bytes[at..end].split_at(entry.domain_len as usize);
+            let (domain, inputs) = bytes
+                .get(at..end)
+                .and_then(|block| block.split_at_checked(entry.domain_len as usize))
+                .ok_or(bad(BlockError::OutOfImage))?;
             let view = LawView::parse(&entry, domain, inputs, &header).map_err(bad)?;
             laws[law as usize] = Some(view);
             at = end;

@@ -80,3 +80,21 @@ impl Drop for GameProgress {
 pub(super) fn watch(name: &'static str) -> Box<dyn Watch> {
     Box::new(GameProgress::new(name))
 }
+
+/// Shows the share of a piece of work that is done; the function it returns answers whether to go on.
+pub(super) fn share(name: &'static str) -> impl Fn(f64) -> bool {
+    let progress = GameProgress::new(name);
+    move |done| {
+        let elapsed = progress.start.elapsed();
+        if elapsed > QUIET {
+            progress.bar.set_draw_target(ProgressDrawTarget::stderr());
+            progress.bar.set_message(format!(
+                "{name}: {:.0} %, {:.0} s",
+                100.0 * done,
+                elapsed.as_secs_f64()
+            ));
+            progress.bar.tick();
+        }
+        !interrupted()
+    }
+}

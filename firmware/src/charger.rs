@@ -1,0 +1,397 @@
+//! The supervisor: one tick from a frequency reading to the charger's set-point.
+//!
+//! `source -> gate -> filter -> observer -> control loop -> dispatch`, and a defined [`Mode`] for every way in which a part
+//! of it can be missing. Nothing here fails: what is wrong at a tick is in the [`Report`].
+//!
+//! ## Time
+//! The caller ticks every `tick_ms` by a millisecond clock that may wrap. A late tick advances observer and control loop by
+//! the ticks that were missed, up to [`CATCH_UP_TICKS_MAX`], with the frequency interpolated; a larger step of the clock, or
+//! one backwards, makes the observer start again. A tick that comes too early advances nothing.
+//!
+//! ## Trust
+//! After a start nobody knows the governor chain: the grid may be in the middle of an event. The observer's initial error
+//! dies out with its slowest time constant, so the droop, which needs f alone, is in force for [`trust_ticks`].
+
+use crate::control_loop::{ControlLoop, Source};
+use crate::dispatch::{Dispatch, SetPoint};
+use crate::droop::Droop;
+use crate::fault::{Faults, Mode, ResetCause};
+use crate::frequency::FrequencySource;
+use crate::frequency::filter::Filter;
+use crate::frequency::gate::{Gate, GateLimits};
+use crate::observer::{Observer, ObserverConfig};
+use crate::phase::Phase;
+use crate::table::{PlantParameters, TableError, TableView};
+use crate::units::{Participation, State};
+
+/// Most ticks made good by one late tick. They cost a tick's work each, and longer gaps make the interpolation a guess.
+pub const CATCH_UP_TICKS_MAX: u16 = 5;
+/// Tick without a table \[ms\].
+pub const TICK_MS_DEFAULT: u16 = 100;
+/// Slowest time constants until an initial error of the chain counts as gone: `e^-6` = 0.25 %.
+const TRUST_TIME_CONSTANTS: u64 = 6;
+
+/// Ticks until the observer of this plant is trusted: 72 s for the paper's `T_2` = 12 s.
+pub fn trust_ticks(plant: &PlantParameters, tick_ms: u16) -> u16 {
+    let slowest = plant
+        .governor_time_us
+        .max(plant.lag_time_us)
+        .max(plant.turbine_time_us);
+    let tick_us = u64::from(tick_ms).max(1) * 1000;
+    let ticks = (TRUST_TIME_CONSTANTS * u64::from(slowest)).div_ceil(tick_us);
+    u16::try_from(ticks).unwrap_or(u16::MAX)
+}
+
+/// Feeds the watchdog. Only a completed tick calls it: every step done, and the set-point accepted by the hardware.
+pub trait Watchdog {
+    /// Restarts the watchdog's time.
+    fn feed(&mut self);
+}
+
+/// Settings of a charger.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct ChargerConfig {
+    /// Which readings are believed.
+    pub gate: GateLimits,
+    /// Ticks of the moving average, 1 for none.
+    pub filter_ticks: u8,
+    /// Ticks without frequency during which the last participation is held.
+    pub hold_ticks: u16,
+    /// Release of the participation per tick once frequency is lost \[ppm\].
+    pub release_ppm: u32,
+    /// Ticks of warm-up; `None` takes [`trust_ticks`].
+    pub warm_up_ticks: Option<u16>,
+}
+
+impl ChargerConfig {
+    /// No filter, 1 s of hold at 100 ms a tick, release over 60 s, warm-up by the plant.
+    pub const DEFAULT: Self = Self {
+        gate: GateLimits::DEFAULT,
+        filter_ticks: 1,
+        hold_ticks: 10,
+        release_ppm: 1_667,
+        warm_up_ticks: None,
+    };
+}
+
+/// What a tick did.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Report {
+    /// Ticks since the start, this one included; saturates.
+    pub sequence: u32,
+    /// The caller's clock \[ms\].
+    pub now_ms: u32,
+    /// Who decided.
+    pub mode: Mode,
+    /// The law in force.
+    pub phase: Phase,
+    /// State estimate.
+    pub state: State,
+    /// Lost power \[kW\], once known.
+    pub loss_kw: Option<i32>,
+    /// Share of the fleet that is to respond.
+    pub participation: Participation,
+    /// What the charger was told; `None` if the hardware refused.
+    pub set_point: Option<SetPoint>,
+    /// What was wrong.
+    pub faults: Faults,
+}
+
+/// A charger: everything between the mains and the car but the hardware.
+#[derive(Debug)]
+pub struct Charger<'t, S, D, W> {
+    source: S,
+    dispatch: D,
+    watchdog: W,
+    config: ChargerConfig,
+    tick_ms: u16,
+    gate: Gate,
+    filter: Filter,
+    /// Plant, coefficients, observer; `None` without a table.
+    observer: Option<(PlantParameters, ObserverConfig, Observer)>,
+    control: ControlLoop<'t>,
+    droop: Droop,
+    /// Restarted by a fault, and the warm-up that follows is not over.
+    restarted: bool,
+    warm_up_ticks: u16,
+    warm_up_left: u16,
+    lost_ticks: u16,
+    /// When the last tick was due.
+    last_ms: Option<u32>,
+    f_uhz: i32,
+    last: Report,
+}
+
+impl<'t, S: FrequencySource, D: Dispatch, W: Watchdog> Charger<'t, S, D, W> {
+    /// A charger before its first tick. `table` is the flash image, checked here.
+    pub fn new(
+        source: S,
+        dispatch: D,
+        watchdog: W,
+        table: &'t [u8],
+        config: ChargerConfig,
+        cause: ResetCause,
+    ) -> Self {
+        let table = TableView::parse(table);
+        let (tick_ms, droop, plant) = match &table {
+            Ok(view) => {
+                let header = view.header();
+                (header.tick_ms, header.droop, Some(header.plant))
+            }
+            Err(_) => (TICK_MS_DEFAULT, Droop::PAPER, None),
+        };
+        let observer = plant.and_then(|plant| {
+            let coefficients = ObserverConfig::new(&plant, tick_ms).ok()?;
+            let observer = Observer::at_rest(coefficients, &plant, 0);
+            Some((plant, coefficients, observer))
+        });
+        // A chain that is too fast for the tick makes the table as useless as a broken one.
+        let table = match (&observer, table) {
+            (None, Ok(_)) => Err(TableError::BadField { offset: 108 }),
+            (_, table) => table,
+        };
+        let warm_up_ticks = config
+            .warm_up_ticks
+            .unwrap_or_else(|| plant.map_or(0, |plant| trust_ticks(&plant, tick_ms)));
+        let gate = Gate::new(
+            config.gate,
+            tick_ms,
+            source.error_uhz(),
+            source.stuck_after(),
+        );
+        Self {
+            source,
+            dispatch,
+            watchdog,
+            config,
+            tick_ms,
+            gate,
+            filter: Filter::new(config.filter_ticks),
+            observer,
+            control: ControlLoop::with_table(table),
+            droop,
+            restarted: cause != ResetCause::PowerOn,
+            warm_up_ticks,
+            warm_up_left: warm_up_ticks,
+            lost_ticks: 0,
+            last_ms: None,
+            f_uhz: 0,
+            last: Report {
+                sequence: 0,
+                now_ms: 0,
+                mode: Mode::WarmUp,
+                phase: Phase::NoControl,
+                state: State::default(),
+                loss_kw: None,
+                participation: Participation::NONE,
+                set_point: None,
+                faults: Faults::NONE,
+            },
+        }
+    }
+
+    /// Length of a tick \[ms\].
+    pub const fn tick_ms(&self) -> u16 {
+        self.tick_ms
+    }
+
+    /// Why the table was rejected, if it was.
+    pub fn table_error(&self) -> Option<TableError> {
+        self.control.table_error()
+    }
+
+    /// The source, to hand it captures.
+    pub const fn source_mut(&mut self) -> &mut S {
+        &mut self.source
+    }
+
+    /// The dispatcher, to change its limits.
+    pub const fn dispatch_mut(&mut self) -> &mut D {
+        &mut self.dispatch
+    }
+
+    /// One tick.
+    pub fn tick(&mut self, now_ms: u32) -> Report {
+        let mut report = Report {
+            sequence: self.last.sequence.saturating_add(1),
+            now_ms,
+            set_point: None,
+            faults: Faults::NONE,
+            ..self.last
+        };
+        let due = self.ticks_due(now_ms, &mut report.faults);
+        let reading = self.source.read(now_ms);
+        match self.gate.admit(reading) {
+            Ok(f_uhz) => self.follow(f_uhz, due, &mut report),
+            Err(error) => {
+                report.faults.insert(error.into());
+                self.without_frequency(due, &mut report);
+            }
+        }
+        if self.control.table_error().is_some() {
+            report.faults.insert(Faults::TABLE_REJECTED);
+        }
+        if report.mode == Mode::WarmUp || self.warm_up_left > 0 {
+            if self.restarted {
+                report.faults.insert(Faults::RESTARTED);
+            }
+        } else {
+            self.restarted = false;
+        }
+        match self.dispatch.apply(report.participation, now_ms) {
+            Ok(set_point) => {
+                report.set_point = Some(set_point);
+                self.watchdog.feed();
+            }
+            Err(_) => report.faults.insert(Faults::DISPATCH),
+        }
+        log_changes(&self.last, &report);
+        self.last = report;
+        report
+    }
+
+    /// Ticks by which to advance; starts the observer again after a jump of the clock.
+    fn ticks_due(&mut self, now_ms: u32, faults: &mut Faults) -> u16 {
+        let tick = u32::from(self.tick_ms).max(1);
+        let Some(last_ms) = self.last_ms else {
+            self.last_ms = Some(now_ms);
+            return 1;
+        };
+        // The nearest whole number of ticks; a tick may come up to half a tick early or late.
+        let elapsed = now_ms.wrapping_sub(last_ms).wrapping_add(tick / 2);
+        if elapsed >= u32::MAX / 2 {
+            // Before the half tick of tolerance: a little early is nothing, more is a clock that went back.
+            let early = last_ms.wrapping_sub(now_ms);
+            if early <= tick {
+                return 0;
+            }
+        } else {
+            let due = elapsed / tick;
+            if due <= u32::from(CATCH_UP_TICKS_MAX) {
+                if due > 1 {
+                    faults.insert(Faults::OVERRUN);
+                }
+                self.last_ms = Some(last_ms.wrapping_add(due * tick));
+                return due as u16;
+            }
+        }
+        faults.insert(Faults::CLOCK_JUMP);
+        self.last_ms = Some(now_ms);
+        self.start_again();
+        1
+    }
+
+    /// Forgets what the observer and the control loop know.
+    fn start_again(&mut self) {
+        self.warm_up_left = self.warm_up_ticks;
+        self.filter.reset();
+        self.control.reset();
+        if let Some((plant, coefficients, observer)) = &mut self.observer {
+            *observer = Observer::at_rest(*coefficients, plant, self.f_uhz);
+        }
+    }
+
+    fn follow(&mut self, f_uhz: i32, due: u16, report: &mut Report) {
+        let lost = self.lost_ticks;
+        self.lost_ticks = 0;
+        if lost > self.config.hold_ticks {
+            self.f_uhz = f_uhz;
+            self.start_again();
+        } else if self.last.sequence == 0 {
+            // The first reading: the best guess is a grid that has been there for long.
+            self.f_uhz = f_uhz;
+            self.start_again();
+        }
+        let f_uhz = self.filter.step(f_uhz);
+        let from = self.f_uhz;
+        for n in 1..=due {
+            // The missed ticks' frequencies lie on a line.
+            let way = i64::from(f_uhz) - i64::from(from);
+            let at = i64::from(from) + way * i64::from(n) / i64::from(due.max(1));
+            self.advance(at as i32, report);
+            self.decide(report);
+        }
+    }
+
+    /// One tick of the observer.
+    fn advance(&mut self, f_uhz: i32, report: &mut Report) {
+        self.f_uhz = f_uhz;
+        report.state = match &mut self.observer {
+            Some((_, _, observer)) => {
+                let state = observer.step(f_uhz);
+                report.loss_kw = observer.loss_kw(report.participation);
+                state
+            }
+            None => State([f_uhz, 0, 0, 0]),
+        };
+    }
+
+    /// One tick of the control loop, or of what stands in for it.
+    fn decide(&mut self, report: &mut Report) {
+        if self.warm_up_left > 0 {
+            self.warm_up_left -= 1;
+            report.mode = Mode::WarmUp;
+            report.phase = Phase::Fallback;
+            report.participation = self.droop.participation(report.state);
+            return;
+        }
+        let action = self.control.step(report.state);
+        report.participation = action.participation;
+        report.phase = action.phase;
+        report.mode = match action.source {
+            Source::Table => Mode::Table,
+            Source::DroopNoTable => Mode::DroopNoTable,
+            Source::DroopOutside => {
+                report.faults.insert(Faults::OUTSIDE_DOMAIN);
+                Mode::DroopOutside
+            }
+        };
+    }
+
+    fn without_frequency(&mut self, due: u16, report: &mut Report) {
+        self.lost_ticks = self.lost_ticks.saturating_add(due);
+        if self.lost_ticks <= self.config.hold_ticks {
+            report.mode = Mode::Hold;
+            // The chain follows the last frequency; the loss estimate would see a kink that was not there.
+            for _ in 0..due {
+                self.advance(self.f_uhz, report);
+            }
+        } else {
+            report.mode = Mode::Safe;
+            report.phase = Phase::Fallback;
+            let release = self.config.release_ppm.saturating_mul(u32::from(due));
+            let ppm = report.participation.ppm().saturating_sub(release);
+            report.participation = Participation::from_ppm(ppm);
+        }
+        report.loss_kw = None;
+        if let Some((_, _, observer)) = &mut self.observer {
+            observer.reset_loss();
+        }
+    }
+}
+
+/// Logs what a tick changed: the mode, and faults that came or went.
+#[cfg(feature = "defmt")]
+fn log_changes(before: &Report, now: &Report) {
+    if now.mode != before.mode {
+        defmt::info!(
+            "tick {=u32}: {} -> {}, f {=i32} uHz",
+            now.sequence,
+            before.mode,
+            now.mode,
+            now.state.frequency_uhz()
+        );
+    }
+    for (fault, name) in Faults::NAMES {
+        if now.faults.without(before.faults).contains(fault) {
+            defmt::warn!("tick {=u32}: fault {=str}", now.sequence, name);
+        }
+        if before.faults.without(now.faults).contains(fault) {
+            defmt::info!("tick {=u32}: cleared {=str}", now.sequence, name);
+        }
+    }
+}
+
+/// Without the `defmt` feature nothing is logged; telemetry carries the same.
+#[cfg(not(feature = "defmt"))]
+fn log_changes(_before: &Report, _now: &Report) {}

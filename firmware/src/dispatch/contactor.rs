@@ -1,0 +1,126 @@
+//! The contactor between mains and car: opened after a pause has lasted, and not closed again too soon.
+//!
+//! A relay wears with every operation, above all with those under load. So a pause is first signalled on the pilot, and
+//! the contactor opens only when the pause has lasted for `open_after_ms`, by when the car has stopped drawing current.
+//! Once open it stays open for `off_min_ms`.
+
+use embedded_hal::digital::OutputPin;
+
+/// Times of a contactor.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct ContactorTimes {
+    /// How long a pause lasts before the contactor opens \[ms\].
+    pub open_after_ms: u32,
+    /// How long it then stays open at least \[ms\].
+    pub off_min_ms: u32,
+}
+
+impl ContactorTimes {
+    /// 10 s, twice the delay of a slow car (5 s), and 60 s.
+    pub const DEFAULT: Self = Self {
+        open_after_ms: 10_000,
+        off_min_ms: 60_000,
+    };
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Contact {
+    Closed,
+    /// Closed, and the pilot has signalled a pause since then.
+    Pausing {
+        since_ms: u32,
+    },
+    Open {
+        since_ms: u32,
+    },
+}
+
+/// A contactor on an output pin: high closes.
+#[derive(Debug)]
+pub struct Contactor<O> {
+    pin: O,
+    times: ContactorTimes,
+    contact: Option<Contact>,
+}
+
+impl<O: OutputPin> Contactor<O> {
+    /// A contactor in an unknown position; the first request sets it.
+    pub const fn new(pin: O, times: ContactorTimes) -> Self {
+        Self {
+            pin,
+            times,
+            contact: None,
+        }
+    }
+
+    /// Asks for the car to be connected or not; whether current may flow.
+    ///
+    /// # Errors
+    /// That of the pin; the position then counts as unknown.
+    pub fn request(&mut self, connect: bool, now_ms: u32) -> Result<bool, O::Error> {
+        let since = |since_ms: u32| now_ms.wrapping_sub(since_ms);
+        let next = match (self.contact, connect) {
+            (None | Some(Contact::Closed | Contact::Pausing { .. }), true) => Contact::Closed,
+            // The first request after a restart: the car may have been paused for any time, so open at once.
+            (None, false) => Contact::Open { since_ms: now_ms },
+            (Some(Contact::Closed), false) => Contact::Pausing { since_ms: now_ms },
+            (Some(Contact::Pausing { since_ms }), false) => {
+                if since(since_ms) >= self.times.open_after_ms {
+                    Contact::Open { since_ms: now_ms }
+                } else {
+                    Contact::Pausing { since_ms }
+                }
+            }
+            (Some(Contact::Open { since_ms }), true)
+                if since(since_ms) >= self.times.off_min_ms =>
+            {
+                Contact::Closed
+            }
+            (Some(Contact::Open { since_ms }), _) => Contact::Open { since_ms },
+        };
+        let open = matches!(next, Contact::Open { .. });
+        let was_open = matches!(self.contact, Some(Contact::Open { .. }));
+        if self.contact.is_none() || open != was_open {
+            self.contact = None;
+            if open {
+                self.pin.set_low()?;
+            } else {
+                self.pin.set_high()?;
+            }
+        }
+        self.contact = Some(next);
+        Ok(next == Contact::Closed)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use embedded_hal_mock::eh1::digital::{Mock, State, Transaction};
+
+    #[test]
+    fn opens_late_and_closes_no_sooner_than_allowed() {
+        let mut pin = Mock::new(&[
+            Transaction::set(State::High),
+            Transaction::set(State::Low),
+            Transaction::set(State::High),
+        ]);
+        let times = ContactorTimes {
+            open_after_ms: 10_000,
+            off_min_ms: 60_000,
+        };
+        let mut contactor = Contactor::new(pin.clone(), times);
+        // The clock wraps on the way.
+        let start = u32::MAX - 20_000;
+        let mut at = |ms: u32, connect| contactor.request(connect, start.wrapping_add(ms));
+        assert_eq!(at(0, true), Ok(true));
+        assert_eq!(at(1_000, false), Ok(false));
+        assert_eq!(at(5_000, true), Ok(true));
+        assert_eq!(at(6_000, false), Ok(false));
+        assert_eq!(at(15_999, false), Ok(false));
+        assert_eq!(at(16_000, false), Ok(false));
+        assert_eq!(at(75_999, true), Ok(false));
+        assert_eq!(at(76_000, true), Ok(true));
+        pin.done();
+    }
+}

@@ -1,0 +1,73 @@
+//! Moving average of the accepted readings.
+//!
+//! Over N ticks it lags a ramp by (N - 1)/2 ticks and divides independent noise by √N. N = 1 passes readings through,
+//! which is right for a source that averages over a tick itself (zero crossings over 100 ms): every tick of lag acts like
+//! a tick of actuation delay.
+
+/// Most ticks averaged.
+pub const FILTER_TICKS_MAX: usize = 8;
+
+/// Moving average over up to [`FILTER_TICKS_MAX`] ticks.
+#[derive(Debug, Clone)]
+pub struct Filter {
+    samples: heapless::Deque<i32, FILTER_TICKS_MAX>,
+    ticks: usize,
+}
+
+impl Filter {
+    /// A filter over this many ticks, limited to 1..=[`FILTER_TICKS_MAX`].
+    pub fn new(ticks: u8) -> Self {
+        Self {
+            samples: heapless::Deque::new(),
+            ticks: usize::from(ticks).clamp(1, FILTER_TICKS_MAX),
+        }
+    }
+
+    /// Lag behind a ramp, in half ticks: N - 1.
+    pub const fn lag_half_ticks(&self) -> usize {
+        self.ticks - 1
+    }
+
+    /// Takes a deviation \[µHz\] and returns the mean of the last N, rounded down; of fewer while it fills.
+    pub fn step(&mut self, deviation_uhz: i32) -> i32 {
+        if self.samples.len() >= self.ticks {
+            let _oldest = self.samples.pop_front();
+        }
+        // There is room: at most ticks - 1 samples are left.
+        let _ = self.samples.push_back(deviation_uhz);
+        if self.ticks == 1 {
+            return deviation_uhz;
+        }
+        let sum: i64 = self.samples.iter().map(|sample| i64::from(*sample)).sum();
+        let count = self.samples.len().max(1) as i64;
+        sum.div_euclid(count) as i32
+    }
+
+    /// Forgets the past.
+    pub fn reset(&mut self) {
+        self.samples.clear();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn lags_a_ramp_by_the_stated_time() {
+        for ticks in 1..=8 {
+            let mut filter = Filter::new(ticks);
+            let out = (0..100).map(|k| filter.step(2000 * k)).last();
+            let lag = filter.lag_half_ticks() as i32 * 1000;
+            assert_eq!(out, Some(99 * 2000 - lag), "{ticks} ticks");
+        }
+    }
+
+    #[test]
+    fn averages_extremes_without_overflow() {
+        let mut filter = Filter::new(8);
+        assert_eq!(filter.step(i32::MIN), i32::MIN);
+        assert_eq!(filter.step(i32::MIN), i32::MIN);
+        assert_eq!(filter.step(i32::MAX), -715_827_883);
+    }
+}

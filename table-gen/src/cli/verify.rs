@@ -1,0 +1,135 @@
+//! `verify TABLE --spec SPEC`: the independent check of the bytes.
+
+use std::path::PathBuf;
+
+use super::{Failure, Overrides, output, progress};
+use crate::verify::{self, Claim, Counterexample, Verdict, VerifyError};
+
+/// Arguments of `verify`.
+#[derive(Debug, clap::Args)]
+pub(super) struct VerifyArgs {
+    /// The table to check
+    #[arg(value_name = "TABLE")]
+    table: PathBuf,
+    /// Name of a shipped spec, or path of a TOML file
+    #[arg(long, value_name = "SPEC")]
+    spec: String,
+    #[command(flatten)]
+    overrides: Overrides,
+    #[command(flatten)]
+    output: super::OutputArgs,
+    /// Also write the verdict to this file
+    #[arg(long, value_name = "FILE")]
+    verdict: Option<PathBuf>,
+}
+
+/// Runs the command.
+pub(super) fn run(args: &VerifyArgs) -> Result<(), Failure> {
+    let spec = args.overrides.load(&args.spec)?;
+    progress::catch_interrupts();
+    let fail = |path: &PathBuf, error: std::io::Error| {
+        Failure::BadInput(format!("{}: {error}", path.display()))
+    };
+    let bytes = std::fs::read(&args.table).map_err(|error| fail(&args.table, error))?;
+    let bar = progress::share("verify");
+    let verdict =
+        verify::verify(&bytes, &spec, &|done| bar(done)).map_err(|error| match error {
+            VerifyError::Interrupted => Failure::No(error.to_string()),
+            _ => Failure::bad(error),
+        })?;
+    drop(bar);
+    if let Some(path) = &args.verdict {
+        let text = serde_json::to_string_pretty(&verdict).map_err(Failure::bad)?;
+        std::fs::write(path, text).map_err(|error| fail(path, error))?;
+    }
+    if args.output.json {
+        output::json(&verdict)?;
+    } else {
+        print(&verdict);
+    }
+    if verdict.verified {
+        return Ok(());
+    }
+    let failed: Vec<&str> = verdict
+        .claims
+        .iter()
+        .filter(|claim| !claim.holds)
+        .map(|claim| claim.name)
+        .collect();
+    Err(Failure::No(format!("not verified: {}", failed.join(", "))))
+}
+
+/// The verdict for people.
+pub(super) fn print(verdict: &Verdict) {
+    output::line(format_args!(
+        "{}: {} ({}, {} reachable cells)",
+        verdict.spec,
+        if verdict.verified {
+            "verified"
+        } else {
+            "NOT verified"
+        },
+        verdict.method,
+        output::grouped(verdict.reachable_cells as usize),
+    ));
+    let mut table = output::table(&["claim", "holds", "bound", "limit", "unit"]);
+    let number = |value: Option<f64>| value.map_or_else(|| "-".to_owned(), |v| format!("{v:.4}"));
+    for claim in &verdict.claims {
+        table.add_row(vec![
+            claim.name.to_owned(),
+            if claim.holds { "yes" } else { "NO" }.to_owned(),
+            number(claim.bound),
+            number(claim.limit),
+            claim.unit.to_owned(),
+        ]);
+    }
+    output::line(table);
+    for claim in &verdict.claims {
+        output::line(format_args!(
+            "  {}: {}{}",
+            claim.name,
+            claim.statement,
+            because(claim)
+        ));
+    }
+    if let Some(example) = &verdict.counterexample {
+        counterexample(example);
+    }
+}
+
+fn because(claim: &Claim) -> String {
+    match &claim.reason {
+        Some(reason) => format!(" - does NOT hold: {reason}"),
+        None => String::new(),
+    }
+}
+
+/// Points of a path that are printed; the JSON has all of them.
+const SHOWN: usize = 12;
+
+fn counterexample(example: &Counterexample) {
+    let Some(real) = &example.real else {
+        output::line(format_args!(
+            "{} is not proven: {}; no real trajectory was found that breaks it. The sets that lead there:",
+            example.claim, example.what
+        ));
+        for step in example.path.iter().rev().take(SHOWN).rev() {
+            output::line(format_args!(
+                "  {:7.2} s  {:10} level {:2}  f in [{:.4}, {:.4}] Hz",
+                step.time_s, step.phase, step.level, step.f_low_hz, step.f_high_hz
+            ));
+        }
+        return;
+    };
+    output::line(format_args!(
+        "{} is refuted by a real trajectory: {} at {:.3} s (event {:.4} s before the first tick; disturbances: {})",
+        example.claim, real.what, real.breach_s, real.first_tick_s, real.adversary
+    ));
+    for point in real.points.iter().rev().take(SHOWN).rev() {
+        let [f, g, l, p] = point.state;
+        output::line(format_args!(
+            "  {:7.2} s  {:10} level {:2}  f {f:.4} Hz  g {g:.3} l {l:.3} p {p:.3} GW",
+            point.time_s, point.phase, point.level
+        ));
+    }
+}

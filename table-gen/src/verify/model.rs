@@ -1,0 +1,139 @@
+//! The closed loop as numbers: plant, clocks and uncertainty of the spec, inputs of the table's header.
+//!
+//! All states and powers are in the device's micro-units (µHz, kW). The plant is linear, so A and b do not change with
+//! the unit. What the firmware does is taken from the header; what the grid and the fleet do from the spec.
+
+use firmware::table::Header;
+
+use super::segment::Segment;
+use crate::flow::{Matrix, Vector};
+use crate::interval::Interval;
+use crate::plant::{GridPlant, STATES};
+use crate::spec::Spec;
+
+/// Micro-units in a unit.
+const MICRO: f64 = firmware::units::MICRO as f64;
+
+/// Interval in which the net power `P u' - w` \[kW\] may vary while a level is held, as centre and radius.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Drive {
+    /// Centre \[kW\].
+    pub(super) mid: f64,
+    /// Largest distance from the centre \[kW\]; 0 if the net power is known exactly.
+    pub(super) radius: f64,
+}
+
+impl Drive {
+    fn of(range: Interval) -> Self {
+        let mid = range.mid();
+        let exact = range.low == range.high;
+        let radius = if exact { 0.0 } else { range.radius() };
+        Self { mid, radius }
+    }
+}
+
+/// Plant, clocks, inputs and bounds of one closed loop.
+#[derive(Debug, Clone)]
+pub(super) struct Model {
+    /// A of `x' = A x + b v`.
+    pub(super) a: Matrix<STATES>,
+    /// b of `x' = A x + b v`.
+    pub(super) b: Vector<STATES>,
+    /// Net power under each level.
+    pub(super) drives: Vec<Drive>,
+    /// Bound of the estimate's error \[micro-units\].
+    pub(super) error: [f64; STATES],
+    /// States at the event \[micro-units\].
+    pub(super) initial: [Interval; STATES],
+    /// Lowest allowed frequency \[µHz\].
+    pub(super) containment: Option<f64>,
+    /// Length of a tick \[s\].
+    pub(super) tick_s: f64,
+    /// One tick.
+    pub(super) tick: Segment,
+    /// One period.
+    pub(super) period: Segment,
+    /// Ticks of a period.
+    pub(super) period_ticks: u32,
+}
+
+impl Model {
+    /// The closed loop of a table's header with a spec's plant and uncertainty.
+    pub(super) fn new(header: &Header, spec: &Spec) -> Self {
+        let (a, b) = GridPlant::new(spec).matrices();
+        let levels = 0..header.levels;
+        let drives = levels
+            .map(|level| Drive::of(net_power(spec, header.participation(level).ppm())))
+            .collect();
+        let tick_s = f64::from(header.tick_ms) / 1000.0;
+        let period_ticks = u32::from(header.period_ticks);
+        // Milliseconds first: the period is then one correctly rounded quotient.
+        let period_s = f64::from(u32::from(header.tick_ms) * period_ticks) / 1000.0;
+        let initial = &spec.uncertainty.initial;
+        Self {
+            a,
+            b,
+            drives,
+            error: spec.uncertainty.measurement.map(up_micro),
+            initial: std::array::from_fn(|d| {
+                let (low, high) = (micro(initial.lower[d]), micro(initial.upper[d]));
+                low.join(high)
+            }),
+            containment: spec.requirements.containment_hz.map(limit_micro),
+            tick_s,
+            tick: Segment::new(&a, &b, tick_s),
+            period: Segment::new(&a, &b, period_s),
+            period_ticks,
+        }
+    }
+
+    /// The segment over which a decision is held.
+    pub(super) fn held(&self, ticks: u32) -> &Segment {
+        if ticks == self.period_ticks {
+            &self.period
+        } else {
+            &self.tick
+        }
+    }
+
+    /// Whether the loop is deterministic but for the moment of the event: no disturbance, no error, one initial state.
+    pub(super) fn is_exact(&self) -> bool {
+        self.drives.iter().all(|drive| drive.radius <= 1e-3)
+            && self.error == [0.0; STATES]
+            && self.initial.iter().all(|axis| axis.high - axis.low <= 1e-3)
+    }
+}
+
+/// A number of the spec in micro-units. Decimal numbers that name whole micro-units become exactly those.
+pub(super) fn micro(value: f64) -> Interval {
+    let scaled = value * MICRO;
+    if (scaled - scaled.round()).abs() <= 1e-9 * scaled.abs().max(1.0) {
+        Interval::point(scaled.round())
+    } else {
+        Interval::point(value) * Interval::point(MICRO)
+    }
+}
+
+fn up_micro(value: f64) -> f64 {
+    micro(value).high
+}
+
+/// A lower limit of frequency \[µHz\], rounded up.
+fn limit_micro(hz: f64) -> f64 {
+    micro(hz).high
+}
+
+/// `P u' - w` \[kW\] for a commanded participation \[ppm\]: u' within the participation error, at most the whole fleet,
+/// w within its band.
+fn net_power(spec: &Spec, ppm: u32) -> Interval {
+    let fleet = micro(spec.fleet_power_gw());
+    let loss = micro(spec.uncertainty.loss_gw[0]).join(micro(spec.uncertainty.loss_gw[1]));
+    let commanded = fleet * Interval::point(f64::from(ppm)) / Interval::point(MICRO);
+    if spec.uncertainty.participation == 0.0 {
+        return commanded - loss;
+    }
+    let error = Interval::point(spec.uncertainty.participation);
+    let low = (commanded * (Interval::ONE - error)).low.max(0.0);
+    let high = (commanded * (Interval::ONE + error)).high.min(fleet.high);
+    Interval::hull(low, high) - loss
+}

@@ -1,0 +1,209 @@
+//! `cargo fw`: the Arm images, built, run in QEMU and measured.
+//!
+//! Exit codes: 0 done; 1 host and target differ, or a figure is past its goal; 2 bad input or a missing tool.
+
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+use clap::{Parser, Subcommand};
+use firmware::link::session::{Session, Wires};
+use firmware::link::{Request, Setup, SourceKind};
+use table_gen::replay::trace;
+use tests::costs::{self, CostError};
+use tests::images::{self, Elf, HOLDFAST, HOLDFAST_LOG, PIL};
+use tests::pil::qemu::Target;
+use tests::pil::run::{Outcome, Pair, closed_loop, recorded};
+use tests::pil::scenario;
+use tests::{root, stand_in};
+
+/// The recorded day, beside the repository.
+const RECORDED: &str = "../shared/data/gb-frequency-2019-08-09.csv";
+/// The table that the images carry.
+const TABLE: &str = "firmware/tables/paper-bi.bin";
+
+/// The Arm images of Holdfast: built, run in QEMU, measured.
+#[derive(Debug, Parser)]
+#[command(name = "fw", max_term_width = 110)]
+struct Cli {
+    #[command(subcommand)]
+    command: Option<Command>,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    /// Build both images, print their sizes, write ELF, BIN and HEX (the default)
+    Images {
+        /// Folder for the files
+        #[arg(long, default_value = "out/firmware")]
+        out: PathBuf,
+        /// Build the product with log lines over the debug probe
+        #[arg(long)]
+        log: bool,
+    },
+    /// Processor in the loop: the pil image in QEMU against the same code on the host, compared to the bit
+    Pil {
+        /// Random scenarios
+        #[arg(long, default_value_t = 1000)]
+        scenarios: u64,
+        /// Ticks of a random scenario (100 ms each)
+        #[arg(long, default_value_t = 600)]
+        ticks: u32,
+        /// Table; the shipped one, or one made by hand if none is shipped
+        #[arg(long)]
+        table: Option<PathBuf>,
+    },
+    /// Measure flash, RAM, stack and instructions, and compare with firmware/expected
+    Costs {
+        /// Take the figures over
+        #[arg(long)]
+        bless: bool,
+    },
+}
+
+type AnyError = Box<dyn std::error::Error>;
+
+fn main() -> ExitCode {
+    let command = Cli::parse().command.unwrap_or(Command::Images {
+        out: "out/firmware".into(),
+        log: false,
+    });
+    let result = match command {
+        Command::Images { out, log } => build_images(&out, log),
+        Command::Pil {
+            scenarios,
+            ticks,
+            table,
+        } => processor_in_the_loop(scenarios, ticks.max(1), table.as_deref()),
+        Command::Costs { bless } => measure(bless),
+    };
+    match result {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("error: {error}");
+            let wrong = matches!(error.downcast_ref(), Some(CostError::Wrong(_)));
+            let differs = matches!(
+                error.downcast_ref(),
+                Some(tests::pil::qemu::PilError::Differs(_))
+            );
+            ExitCode::from(if wrong || differs { 1 } else { 2 })
+        }
+    }
+}
+
+fn build_images(out: &Path, log: bool) -> Result<(), AnyError> {
+    let product = if log { HOLDFAST_LOG } else { HOLDFAST };
+    for image in [product, PIL] {
+        let elf = Elf::read(&images::build(image)?)?;
+        println!("{}", image.name);
+        for section in elf.sections()? {
+            let place = match (section.in_flash, section.in_ram) {
+                (true, true) => "flash and RAM",
+                (true, false) => "flash",
+                _ => "RAM",
+            };
+            println!(
+                "  {:<20} {:#010x} {:>8} bytes  {place}",
+                section.name, section.address, section.size
+            );
+        }
+        for file in images::write(image, &elf, &root().join(out))? {
+            println!("  {}", file.display());
+        }
+    }
+    Ok(())
+}
+
+/// The table of a run: the one named, the shipped one, or the stand-in.
+fn table_bytes(named: Option<&Path>) -> Result<Vec<u8>, AnyError> {
+    let shipped = root().join(TABLE);
+    let path = match named {
+        Some(path) => path,
+        None if shipped.exists() => &shipped,
+        None => {
+            println!("no {TABLE}: a stand-in table made by hand is used");
+            return stand_in::table(true).map_err(|error| format!("{error:?}").into());
+        }
+    };
+    std::fs::read(path).map_err(|error| format!("{}: {error}", path.display()).into())
+}
+
+fn processor_in_the_loop(scenarios: u64, ticks: u32, table: Option<&Path>) -> Result<(), AnyError> {
+    let table = table_bytes(table)?;
+    let image = images::build(PIL)?;
+    let mut target = Target::start(&image, &table, false)?;
+    let wires = Wires::default();
+    let mut host = Session::new(&wires, &table);
+    let mut pair = Pair::new(&mut host, &mut target)?;
+    for bidirectional in [false, true] {
+        let outcome = closed_loop(&mut pair, &scenario::event(bidirectional))?;
+        tell("the paper's event", &outcome);
+    }
+    replay(&mut pair)?;
+    let mut sum: Option<Outcome> = None;
+    for n in 0..scenarios {
+        let outcome = closed_loop(&mut pair, &scenario::random(n, ticks))
+            .map_err(|error| format!("random scenario {n}: {error}"))?;
+        sum.get_or_insert(outcome).add(&outcome);
+    }
+    if let Some(sum) = sum {
+        tell(&format!("{scenarios} random scenarios"), &sum);
+    }
+    let agreed = pair.agreed;
+    target.ask(&Request::Stop)?;
+    println!("{agreed} answers, target and host equal to the bit");
+    Ok(())
+}
+
+fn replay(pair: &mut Pair<'_, '_>) -> Result<(), AnyError> {
+    let path = root().join(RECORDED);
+    if !path.exists() {
+        println!("SKIPPED: the replay of 9 August 2019, for {RECORDED} is not there");
+        return Ok(());
+    }
+    let trace = trace::read(&path, None)?;
+    let deviations: Vec<f64> = trace
+        .samples
+        .iter()
+        .map(|sample| sample.frequency_hz - 50.0)
+        .collect();
+    for source in [
+        SourceKind::Deviation,
+        SourceKind::Ade7953,
+        SourceKind::ZeroCrossing,
+    ] {
+        let setup = Setup {
+            source,
+            bidirectional: source == SourceKind::Deviation,
+            serial: 1,
+            limit: 32_000,
+            warm_up_ticks: None,
+            brown_out: false,
+        };
+        let outcome = recorded(pair, setup, &deviations)?;
+        tell(&format!("9 August 2019, {source:?}"), &outcome);
+    }
+    Ok(())
+}
+
+fn tell(what: &str, outcome: &Outcome) {
+    let [warm_up, table, outside, none, hold, safe] = outcome.modes;
+    println!(
+        "{what}: lowest {:.3} Hz, participation up to {:.3}, faults {:#06x}; ticks: {warm_up} warm-up, \
+         {table} table, {outside} outside, {none} no table, {hold} hold, {safe} safe",
+        50.0 + outcome.lowest_hz,
+        outcome.most,
+        outcome.faults
+    );
+}
+
+fn measure(bless: bool) -> Result<(), AnyError> {
+    let sizes = costs::sizes()?;
+    print!("{}", sizes.text());
+    let run = costs::run(&table_bytes(None)?)?;
+    print!("{}", run.text());
+    let checks = [sizes.check("sizes.txt", bless), run.check("run.txt", bless)];
+    for check in checks {
+        check?;
+    }
+    Ok(())
+}

@@ -1,0 +1,382 @@
+//! What the firmware costs, measured and compared with what is committed.
+//!
+//! | file in firmware/expected | holds | measured by |
+//! |---|---|---|
+//! | `sizes.txt` | flash and static RAM by section, panics, allocation, float formatting | the ELF files |
+//! | `run.txt` | stack, instructions of a lookup and of a tick | QEMU: painted stack, system timer under `-icount` |
+//!
+//! Every figure must stay within its goal. The text itself must be equal as well, as long as compiler and table are those
+//! that the file names; with others a difference is only shown.
+
+use std::fmt::Write as _;
+use std::fs;
+use std::io::{self, Write as _};
+use std::path::Path;
+use std::process::{Command, Stdio};
+use std::time::Duration;
+
+use firmware::link::session::{Session, Wires};
+use firmware::link::{Request, Response};
+use firmware::table::{Law, TableView, checksum};
+
+use crate::images::{self, BARE, Elf, HOLDFAST, ImageError, PIL};
+use crate::pil::qemu::{PilError, Target, instructions};
+use crate::pil::run::{Pair, closed_loop};
+use crate::pil::scenario;
+use crate::root;
+
+/// Goal for code and constants of the charger without a HAL \[bytes\].
+const CORE_MAX: u32 = 16 * 1024;
+/// Goal for variables and stack \[bytes\].
+const RAM_MAX: u32 = 4 * 1024;
+/// Goal for a lookup \[instructions\].
+const LOOKUP_MAX: u32 = 350;
+/// Goal for a tick \[instructions\].
+const TICK_MAX: u32 = 5_000;
+/// Start and length of the board's RAM, from memory.x.
+const RAM: (u32, usize) = (0x2000_0000, 128 * 1024);
+/// What the runtime paints unused stack with.
+const PAINT: [u8; 4] = [0xCC; 4];
+/// How long the charger without a HAL runs before its stack is read: many rounds of what it plays.
+const PAINTED_RUN: Duration = Duration::from_secs(4);
+/// Random scenarios with faults for the worst tick.
+const SCENARIOS: u64 = 60;
+/// Lookups of each law that are counted.
+const LOOKUPS: usize = 1000;
+
+/// Why nothing was measured, or the figures are not as they must be.
+#[derive(Debug, thiserror::Error)]
+pub enum CostError {
+    /// An image.
+    #[error(transparent)]
+    Image(#[from] ImageError),
+    /// The link.
+    #[error(transparent)]
+    Pil(#[from] PilError),
+    /// A file or QEMU.
+    #[error("{what}: {source}")]
+    Io {
+        /// What was tried.
+        what: String,
+        /// Why it failed.
+        source: io::Error,
+    },
+    /// A symbol of the image is missing.
+    #[error("the image has no symbol {0}")]
+    Symbol(&'static str),
+    /// A figure is past its goal, or differs.
+    #[error("{0}")]
+    Wrong(String),
+}
+
+fn io_error(what: impl Into<String>) -> impl FnOnce(io::Error) -> CostError {
+    let what = what.into();
+    |source| CostError::Io { what, source }
+}
+
+/// A list of figures as it is committed.
+#[derive(Debug, Default)]
+pub struct Figures {
+    text: String,
+    past: Vec<String>,
+}
+
+impl Figures {
+    fn line(&mut self, name: &str, value: u32, unit: &str, goal: Option<u32>) {
+        let goal_text = goal.map_or_else(String::new, |goal| format!("  goal at most {goal}"));
+        // Writing to a String cannot fail.
+        let _ = writeln!(self.text, "{name:<44}{value:>8} {unit}{goal_text}");
+        if goal.is_some_and(|goal| value > goal) {
+            self.past
+                .push(format!("{name}: {value} {unit},{goal_text}"));
+        }
+    }
+
+    fn note(&mut self, text: &str) {
+        let _ = writeln!(self.text, "# {text}");
+    }
+
+    /// The text.
+    pub fn text(&self) -> &str {
+        &self.text
+    }
+
+    /// Compares with the committed file, or replaces it.
+    ///
+    /// # Errors
+    /// A goal is missed, or a figure differs although compiler and table are the file's.
+    pub fn check(&self, file: &str, bless: bool) -> Result<(), CostError> {
+        let path = root().join("firmware/expected").join(file);
+        if bless {
+            fs::write(&path, &self.text).map_err(io_error(path.display().to_string()))?;
+        }
+        if !self.past.is_empty() {
+            return Err(CostError::Wrong(self.past.join("\n")));
+        }
+        let committed = fs::read_to_string(&path).map_err(io_error(path.display().to_string()))?;
+        let notes = |text: &str| -> Vec<String> {
+            let lines = text.lines().filter(|line| line.starts_with('#'));
+            lines.map(str::to_owned).collect()
+        };
+        let differs = difference(&committed, &self.text);
+        if differs.is_empty() {
+            println!("    {file}: as committed");
+            Ok(())
+        } else if notes(&committed) == notes(&self.text) {
+            let message =
+                format!("{file} differs; `cargo fw costs --bless` takes it over:\n{differs}");
+            Err(CostError::Wrong(message))
+        } else {
+            println!(
+                "    {file}: other compiler or table than committed; goals are met:\n{differs}"
+            );
+            Ok(())
+        }
+    }
+}
+
+fn difference(old: &str, new: &str) -> String {
+    let mut text = String::new();
+    for line in old.lines().filter(|line| !new.lines().any(|n| n == *line)) {
+        let _ = writeln!(text, "  - {line}");
+    }
+    for line in new.lines().filter(|line| !old.lines().any(|o| o == *line)) {
+        let _ = writeln!(text, "  + {line}");
+    }
+    text
+}
+
+fn compiler() -> String {
+    let output = Command::new("rustc").arg("--version").output();
+    output.map_or_else(
+        |_| "unknown compiler".into(),
+        |output| String::from_utf8_lossy(&output.stdout).trim().to_owned(),
+    )
+}
+
+/// Demangled enough to search in: the path parts are in the mangled name as they are.
+fn count(symbols: &[String], parts: &[&str]) -> u32 {
+    let hit = |name: &&String| parts.iter().any(|part| name.contains(part));
+    symbols.iter().filter(hit).count() as u32
+}
+
+/// Flash and static RAM, and what must not be in the charger at all.
+///
+/// # Errors
+/// An image cannot be built or read.
+pub fn sizes() -> Result<Figures, CostError> {
+    let mut figures = Figures::default();
+    figures.note(&compiler());
+    for image in [HOLDFAST, BARE] {
+        let elf = Elf::read(&images::build(image)?)?;
+        let (mut ram, mut code) = (0, 0);
+        for section in elf.sections()? {
+            // The table is the spec's business, not the code's: `table-gen budget` tells its size.
+            if section.name == ".holdfast_table" {
+                continue;
+            }
+            let name = format!("{} {}", image.name, section.name);
+            figures.line(&name, section.size, "bytes", None);
+            if section.in_ram {
+                ram += section.size;
+            }
+            // The vectors belong to the processor; a charger beside other code has them already.
+            if section.in_flash && section.name != ".vector_table" {
+                code += section.size;
+            }
+        }
+        let bare = image == BARE;
+        let name = format!("{} code and constants", image.name);
+        figures.line(&name, code, "bytes", bare.then_some(CORE_MAX));
+        let name = format!("{} static RAM", image.name);
+        figures.line(&name, ram, "bytes", Some(RAM_MAX));
+        let symbols = elf.symbols()?;
+        let checks = [
+            (
+                "panic functions",
+                &["panicking", "panic_fmt", "unwrap_failed", "expect_failed"][..],
+            ),
+            (
+                "allocation functions",
+                &["__rust_alloc", "__rg_alloc", "5alloc"],
+            ),
+            (
+                "float formatting functions",
+                &["flt2dec", "float_to_decimal", "float_to_general"],
+            ),
+        ];
+        for (what, parts) in checks {
+            let name = format!("{} {what}", image.name);
+            figures.line(&name, count(&symbols, parts), "symbols", Some(0));
+        }
+    }
+    Ok(figures)
+}
+
+/// Stack and instructions.
+///
+/// # Errors
+/// An image cannot be built, QEMU cannot run it, or it disagrees with the host.
+pub fn run(table: &[u8]) -> Result<Figures, CostError> {
+    let mut figures = Figures::default();
+    figures.note(&compiler());
+    figures.note(&format!(
+        "table of {} bytes, CRC {:08x}",
+        table.len(),
+        checksum(table)
+    ));
+    let bare = Elf::read(&images::build(BARE)?)?;
+    let stack = painted_stack(&bare, table)?;
+    let ram: u32 = bare
+        .sections()?
+        .iter()
+        .filter(|s| s.in_ram)
+        .map(|s| s.size)
+        .sum();
+    figures.line("bare stack, whole program", stack, "bytes", None);
+    figures.line(
+        "bare stack and static RAM",
+        stack + ram,
+        "bytes",
+        Some(RAM_MAX),
+    );
+
+    let pil = images::build(PIL)?;
+    let mut target = Target::start(&pil, table, true)?;
+    let wires = Wires::default();
+    let mut host = Session::new(&wires, table);
+    let mut pair = Pair::new(&mut host, &mut target)?;
+    for bidirectional in [false, true] {
+        closed_loop(&mut pair, &scenario::event(bidirectional))?;
+    }
+    let event = std::mem::take(&mut pair.worst);
+    figures.line(
+        "tick, the paper's event",
+        instructions(event.0),
+        "instructions",
+        Some(TICK_MAX),
+    );
+    for n in 0..SCENARIOS {
+        closed_loop(&mut pair, &scenario::random(n, 600))?;
+    }
+    let worst = pair.worst;
+    figures.line(
+        "tick, random scenarios with faults",
+        instructions(worst.0),
+        "instructions",
+        Some(TICK_MAX),
+    );
+    figures.line(
+        "stack of a tick, random scenarios with faults",
+        worst.1.max(event.1),
+        "bytes",
+        None,
+    );
+    let lookup = worst_lookup(&mut target, table)?;
+    figures.line(
+        "lookup with quantiser",
+        lookup,
+        "instructions",
+        Some(LOOKUP_MAX),
+    );
+    target.ask(&Request::Stop)?;
+    Ok(figures)
+}
+
+/// Bytes of stack that the charger without a HAL ever used, from a dump of the emulator's RAM.
+fn painted_stack(elf: &Elf, table: &[u8]) -> Result<u32, CostError> {
+    let bottom = elf
+        .symbol("_stack_end")?
+        .ok_or(CostError::Symbol("_stack_end"))?;
+    let top = elf
+        .symbol("_stack_start")?
+        .ok_or(CostError::Symbol("_stack_start"))?;
+    let folder = tempfile::tempdir().map_err(io_error("temporary folder"))?;
+    let (image, table_file) = (
+        folder.path().join("bare.elf"),
+        folder.path().join("table.bin"),
+    );
+    elf.save(&image)?;
+    fs::write(&table_file, table).map_err(io_error("table.bin"))?;
+    let dump = folder.path().join("ram.bin");
+    emulate(&image, &table_file, &dump)?;
+    let ram = fs::read(&dump).map_err(io_error("dump of the emulator's RAM"))?;
+    let at = |address: u32| (address - RAM.0) as usize;
+    let stack = ram.get(at(bottom)..at(top)).unwrap_or_default();
+    let untouched = stack.chunks_exact(4).take_while(|word| **word == PAINT);
+    Ok((stack.len() - 4 * untouched.count()) as u32)
+}
+
+fn emulate(image: &Path, table: &Path, dump: &Path) -> Result<(), CostError> {
+    let loader = format!(
+        "loader,file={},addr=0x080E0000,force-raw=on",
+        table.display()
+    );
+    let mut qemu = Command::new("qemu-system-arm")
+        .args([
+            "-machine",
+            "netduinoplus2",
+            "-display",
+            "none",
+            "-serial",
+            "none",
+        ])
+        .args(["-monitor", "stdio", "-device", &loader, "-kernel"])
+        .arg(image)
+        .stdin(Stdio::piped())
+        .stdout(Stdio::null())
+        .spawn()
+        .map_err(io_error("qemu-system-arm"))?;
+    std::thread::sleep(PAINTED_RUN);
+    if let Some(monitor) = &mut qemu.stdin {
+        let commands = format!(
+            "pmemsave {} {} \"{}\"\nquit\n",
+            RAM.0,
+            RAM.1,
+            dump.display()
+        );
+        monitor
+            .write_all(commands.as_bytes())
+            .map_err(io_error("QEMU's monitor"))?;
+    }
+    qemu.wait().map_err(io_error("qemu-system-arm"))?;
+    Ok(())
+}
+
+/// Instructions of the dearest lookup among the cells with the most visits of each law.
+fn worst_lookup(target: &mut Target, table: &[u8]) -> Result<u32, CostError> {
+    let view = TableView::parse(table)
+        .map_err(|error| CostError::Wrong(format!("the table is rejected: {error:?}")))?;
+    let grid = view.header().grid;
+    let mut worst = 0;
+    for law in Law::ALL {
+        let Some(reader) = view.law(law) else {
+            continue;
+        };
+        // A sample of the grid by a stride that is prime to it, the dearest cells first.
+        let cells = grid.cells();
+        let stride = 100_003;
+        let mut dearest: Vec<_> = (0..cells.min(400_000))
+            .filter_map(|n| {
+                let cell = crate::stand_in::cell_of(
+                    &grid,
+                    (u64::from(n) * stride % u64::from(cells)) as u32,
+                );
+                let low = grid.bounds(cell)?.map(|(low, _)| low);
+                Some((reader.encoding().visits(cell), low))
+            })
+            .collect();
+        dearest.sort_by_key(|(visits, _)| std::cmp::Reverse(*visits));
+        for (_, state) in dearest.into_iter().take(LOOKUPS) {
+            let reply = target.ask(&Request::Lookup {
+                law: law as u8,
+                state,
+            })?;
+            if reply.response == Response::Refused {
+                return Err(CostError::Wrong("a lookup was refused".into()));
+            }
+            worst = worst.max(instructions(reply.systick));
+        }
+    }
+    Ok(worst)
+}

@@ -1,0 +1,6 @@
+//! Processor in the loop: the `pil` image in QEMU, the same session on the host, and a grid between them.
+
+pub mod mains;
+pub mod qemu;
+pub mod run;
+pub mod scenario;
