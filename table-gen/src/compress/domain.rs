@@ -79,13 +79,6 @@ impl Play<'_> {
             };
             let part = self.describe(&kept, &spaces, budget)?;
             let cells = self.covered(&part);
-            eprintln!(
-                kept.count(),
-                cells.count(),
-                part.tree.leaves(),
-                part.bytes.len(),
-                part.spaces.spaces.len()
-            );
             if cells == kept {
                 return Ok(Domain {
                     cells,
