@@ -14,6 +14,7 @@
 //! | [`pipeline`] | a spec | a table, the whole way |
 //! | [`simulation`] | a table, or a baseline | the grid's frequency in time |
 //! | [`replay`] | a recorded frequency | what the firmware would have done |
+//! | [`monitor`] | a charger's telemetry | lines for a person |
 //! | [`cli`] | arguments | all of the above |
 #![forbid(unsafe_code)]
 
@@ -24,6 +25,7 @@ pub mod flow;
 pub mod game;
 pub mod grid_shape;
 pub mod interval;
+pub mod monitor;
 pub mod pipeline;
 pub mod plant;
 pub mod replay;

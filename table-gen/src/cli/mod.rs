@@ -3,6 +3,7 @@
 //! Exit codes: 0 done; 1 the answer is "no" (not verified, no controller exists, limit reached); 2 bad input.
 
 mod build;
+mod monitor;
 mod output;
 mod progress;
 mod replay;
@@ -36,6 +37,8 @@ enum Command {
     Replay(replay::ReplayArgs),
     /// Check the bytes of a table against a spec, independently of how they were made
     Verify(verify::VerifyArgs),
+    /// Show a charger's telemetry, live from a serial port or from a recording
+    Monitor(monitor::MonitorArgs),
 }
 
 /// The spec and what overrides it.
@@ -142,6 +145,7 @@ pub fn run() -> ExitCode {
         Command::Simulate(args) => simulate::run(&args),
         Command::Replay(args) => replay::run(&args),
         Command::Verify(args) => verify::run(&args),
+        Command::Monitor(args) => monitor::run(&args),
     };
     match result {
         Ok(()) => ExitCode::SUCCESS,
