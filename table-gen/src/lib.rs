@@ -10,16 +10,21 @@
 //! | [`grid_shape`], [`abstraction`] | plant and grid | boxes of successor cells |
 //! | [`game`] | an abstraction and a target | allowed inputs and ranks |
 //! | [`synthesis`] | a spec | the laws C1, C2, Hold |
+//! | [`compress`] | the laws' freedom | small trees and domains |
 //! | [`emit`] | laws | the bytes of a table |
 //! | [`pipeline`] | a spec | a table, the whole way |
 //! | [`simulation`] | a table, or a baseline | the grid's frequency in time |
 //! | [`replay`] | a recorded frequency | what the firmware would have done |
 //! | [`monitor`] | a charger's telemetry | lines for a person |
+//! | [`boost_converter`] | a second plant: the engine knows none |
+//! | [`report`] | runs and findings | one HTML page and its figures |
 //! | [`cli`] | arguments | all of the above |
 #![forbid(unsafe_code)]
 
 pub mod abstraction;
+pub mod boost_converter;
 pub mod cli;
+pub mod compress;
 pub mod emit;
 pub mod flow;
 pub mod game;
@@ -29,6 +34,7 @@ pub mod monitor;
 pub mod pipeline;
 pub mod plant;
 pub mod replay;
+pub mod report;
 pub mod simulation;
 pub mod spec;
 pub mod synthesis;

@@ -1,13 +1,11 @@
 //! `build SPEC`: the whole way, and its files.
-//!
-//! Files are written into a temporary folder beside the target and moved when all of them are complete: an interruption
-//! or a failure leaves nothing behind.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use firmware::table::{Law, TableView};
 use serde::Serialize;
 
+use super::files::write_all;
 use super::synth::SynthReport;
 use super::{Failure, OutputArgs, SpecArgs, output, progress, simulate};
 use crate::pipeline;
@@ -124,29 +122,4 @@ fn print_encodings(report: &BuildReport<'_>) {
 /// Lower-case hexadecimal.
 pub(super) fn hex(bytes: &[u8]) -> String {
     bytes.iter().map(|byte| format!("{byte:02x}")).collect()
-}
-
-/// Writes all files or none.
-fn write_all(dir: &Path, files: &[(&str, &[u8])]) -> Result<(), Failure> {
-    let fail = |path: &Path, error: std::io::Error| {
-        Failure::BadInput(format!("{}: {error}", path.display()))
-    };
-    std::fs::create_dir_all(dir).map_err(|error| fail(dir, error))?;
-    // In the target's own folder, so that the moves stay on one file system.
-    let staging = tempfile::Builder::new()
-        .prefix(".partial-")
-        .tempdir_in(dir)
-        .map_err(|error| fail(dir, error))?;
-    for (name, bytes) in files {
-        let path = staging.path().join(name);
-        std::fs::write(&path, bytes).map_err(|error| fail(&path, error))?;
-    }
-    if progress::interrupted() {
-        return Err(Failure::No("interrupted; nothing was written".to_owned()));
-    }
-    for (name, _) in files {
-        let to = dir.join(name);
-        std::fs::rename(staging.path().join(name), &to).map_err(|error| fail(&to, error))?;
-    }
-    Ok(())
 }

@@ -2,11 +2,16 @@
 //!
 //! Exit codes: 0 done; 1 the answer is "no" (not verified, no controller exists, limit reached); 2 bad input.
 
+mod band;
 mod build;
 mod monitor;
+mod files;
+mod monte_carlo;
 mod output;
+mod plot;
 mod progress;
 mod replay;
+mod report;
 mod simulate;
 mod synth;
 mod verify;
@@ -33,6 +38,8 @@ enum Command {
     Synth(synth::SynthArgs),
     /// Run the grid with no response, the baseline droop or the firmware on a table
     Simulate(simulate::SimulateArgs),
+    /// One HTML page with the figures of the paper and more, and each figure as .svg and .csv
+    Report(report::ReportArgs),
     /// Run the firmware on a recorded frequency
     Replay(replay::ReplayArgs),
     /// Check the bytes of a table against a spec, independently of how they were made
@@ -143,6 +150,7 @@ pub fn run() -> ExitCode {
         Command::Build(args) => build::run(&args),
         Command::Synth(args) => synth::run(&args),
         Command::Simulate(args) => simulate::run(&args),
+        Command::Report(args) => report::run(&args),
         Command::Replay(args) => replay::run(&args),
         Command::Verify(args) => verify::run(&args),
         Command::Monitor(args) => monitor::run(&args),
