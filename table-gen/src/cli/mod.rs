@@ -4,8 +4,8 @@
 
 mod band;
 mod build;
-mod monitor;
 mod files;
+mod monitor;
 mod monte_carlo;
 mod output;
 mod plot;
