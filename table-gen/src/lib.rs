@@ -16,7 +16,7 @@
 //! | [`simulation`] | a table, or a baseline | the grid's frequency in time |
 //! | [`replay`] | a recorded frequency | what the firmware would have done |
 //! | [`monitor`] | a charger's telemetry | lines for a person |
-//! | [`boost_converter`] | a second plant: the engine knows none |
+//! | [`boost_converter`] | nothing | a second plant: the engine knows none |
 //! | [`report`] | runs and findings | one HTML page and its figures |
 //! | [`cli`] | arguments | all of the above |
 #![forbid(unsafe_code)]

@@ -212,7 +212,7 @@ fn first_decision(spec: &Spec, table: &TableView<'_>, n: u32) -> Option<[u16; 4]
     let h = 0.001;
     let offset = (share(29) * 100.0) as u32;
     for millisecond in 0..20_000u32 {
-        if millisecond >= offset && (millisecond - offset) % 100 == 0 {
+        if millisecond >= offset && (millisecond - offset).is_multiple_of(100) {
             let measured = State(x.map(|v| (v * 1e6).floor() as i32));
             if PhaseState::INITIAL.step(table, measured).0.phase != Phase::NoControl {
                 return table.header().grid.quantise(measured).map(|cell| cell.0);
