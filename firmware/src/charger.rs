@@ -200,6 +200,11 @@ impl<'t, S: FrequencySource, D: Dispatch, W: Watchdog> Charger<'t, S, D, W> {
         self.control.table_error()
     }
 
+    /// The table, if it was accepted.
+    pub fn table(&self) -> Option<&TableView<'t>> {
+        self.control.table()
+    }
+
     /// The source, to hand it captures.
     pub const fn source_mut(&mut self) -> &mut S {
         &mut self.source

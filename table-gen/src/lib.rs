@@ -15,6 +15,7 @@
 //! | [`pipeline`] | a spec | a table, the whole way |
 //! | [`simulation`] | a table, or a baseline | the grid's frequency in time |
 //! | [`replay`] | a recorded frequency | what the firmware would have done |
+//! | [`monitor`] | a charger's telemetry | lines for a person |
 //! | [`boost_converter`] | nothing | a second plant: the engine knows none |
 //! | [`report`] | runs and findings | one HTML page and its figures |
 //! | [`cli`] | arguments | all of the above |
@@ -29,6 +30,7 @@ pub mod flow;
 pub mod game;
 pub mod grid_shape;
 pub mod interval;
+pub mod monitor;
 pub mod pipeline;
 pub mod plant;
 pub mod replay;

@@ -168,7 +168,7 @@ pub fn sizes() -> Result<Figures, CostError> {
     let mut figures = Figures::default();
     figures.note(&compiler());
     for image in [HOLDFAST, BARE] {
-        let elf = Elf::read(&images::build(image)?)?;
+        let elf = Elf::read(&images::build(image, images::TARGET)?)?;
         let (mut ram, mut code) = (0, 0);
         for section in elf.sections()? {
             // The table is the spec's business, not the code's: `table-gen budget` tells its size.
@@ -225,7 +225,7 @@ pub fn run(table: &[u8]) -> Result<Figures, CostError> {
         table.len(),
         checksum(table)
     ));
-    let bare = Elf::read(&images::build(BARE)?)?;
+    let bare = Elf::read(&images::build(BARE, images::TARGET)?)?;
     let stack = painted_stack(&bare, table)?;
     let ram: u32 = bare
         .sections()?
@@ -241,7 +241,7 @@ pub fn run(table: &[u8]) -> Result<Figures, CostError> {
         Some(RAM_MAX),
     );
 
-    let pil = images::build(PIL)?;
+    let pil = images::build(PIL, images::TARGET)?;
     let mut target = Target::start(&pil, table, true)?;
     let wires = Wires::default();
     let mut host = Session::new(&wires, table);

@@ -5,6 +5,7 @@
 mod band;
 mod build;
 mod files;
+mod monitor;
 mod monte_carlo;
 mod output;
 mod plot;
@@ -43,6 +44,8 @@ enum Command {
     Replay(replay::ReplayArgs),
     /// Check the bytes of a table against a spec, independently of how they were made
     Verify(verify::VerifyArgs),
+    /// Show a charger's telemetry, live from a serial port or from a recording
+    Monitor(monitor::MonitorArgs),
 }
 
 /// The spec and what overrides it.
@@ -151,6 +154,7 @@ pub fn run() -> ExitCode {
         Command::Report(args) => report::run(&args),
         Command::Replay(args) => replay::run(&args),
         Command::Verify(args) => verify::run(&args),
+        Command::Monitor(args) => monitor::run(&args),
     };
     match result {
         Ok(()) => ExitCode::SUCCESS,
