@@ -23,18 +23,30 @@ fn spec(set: &[&str]) -> Spec {
 
 /// Grids of 0.3, 2.4 and 17.5 million cells, the period and the games the same.
 const SIZES: [(&str, &[&str]); 3] = [
-    ("0.3M", &["grid.width=[0.05,0.1,0.1,0.1]", "method.successor=exact-linear"]),
+    (
+        "0.3M",
+        &[
+            "grid.width=[0.05,0.1,0.1,0.1]",
+            "method.successor=exact-linear",
+        ],
+    ),
     ("2.4M", &["method.successor=exact-linear"]),
-    ("17.5M", &["grid.width=[0.05,0.025,0.025,0.025]", "method.successor=exact-linear"]),
+    (
+        "17.5M",
+        &[
+            "grid.width=[0.05,0.025,0.025,0.025]",
+            "method.successor=exact-linear",
+        ],
+    ),
 ];
 
 #[divan::bench(args = [0, 1, 2], sample_count = 5)]
 fn reach_avoid_c1_and_c2(bencher: Bencher<'_, '_>, size: usize) {
     let spec = spec(SIZES[size].1);
     let cells = spec.grid.cells();
-    bencher.counter(ItemsCount::new(cells)).bench(|| {
-        synthesis::synthesise(&spec, &|_| Box::new(Unwatched) as Box<dyn Watch>)
-    });
+    bencher
+        .counter(ItemsCount::new(cells))
+        .bench(|| synthesis::synthesise(&spec, &|_| Box::new(Unwatched) as Box<dyn Watch>));
 }
 
 #[divan::bench]
@@ -43,18 +55,24 @@ fn successor_boxes_of_all_inputs(bencher: Bencher<'_, '_>) {
     let grid = synthesis::device_grid(&spec).unwrap();
     let abstraction = synthesis::abstraction(&spec, &grid).unwrap();
     let cells: Vec<[u32; 4]> = (0..4096)
-        .map(|i| abstraction.shape().cell(i * 577 % abstraction.shape().cells()))
+        .map(|i| {
+            abstraction
+                .shape()
+                .cell(i * 577 % abstraction.shape().cells())
+        })
         .collect();
-    bencher.counter(ItemsCount::new(cells.len() * abstraction.inputs())).bench(|| {
-        let mut inside = 0u32;
-        for cell in &cells {
-            let anchor = abstraction.anchor(divan::black_box(*cell));
-            for input in 0..abstraction.inputs() {
-                inside += u32::from(abstraction.successor(&anchor, input).is_some());
+    bencher
+        .counter(ItemsCount::new(cells.len() * abstraction.inputs()))
+        .bench(|| {
+            let mut inside = 0u32;
+            for cell in &cells {
+                let anchor = abstraction.anchor(divan::black_box(*cell));
+                for input in 0..abstraction.inputs() {
+                    inside += u32::from(abstraction.successor(&anchor, input).is_some());
+                }
             }
-        }
-        inside
-    });
+            inside
+        });
 }
 
 #[divan::bench]

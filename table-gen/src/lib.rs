@@ -13,6 +13,7 @@
 //! | [`emit`] | laws | the bytes of a table |
 //! | [`pipeline`] | a spec | a table, the whole way |
 //! | [`simulation`] | a table, or a baseline | the grid's frequency in time |
+//! | [`fleet`] | a table | the same with one firmware for each charger |
 //! | [`replay`] | a recorded frequency | what the firmware would have done |
 //! | [`report`] | runs and findings | one HTML page and its figures |
 //! | [`cli`] | arguments | all of the above |
@@ -21,6 +22,7 @@
 pub mod abstraction;
 pub mod cli;
 pub mod emit;
+pub mod fleet;
 pub mod flow;
 pub mod game;
 pub mod grid_shape;

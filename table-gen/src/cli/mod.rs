@@ -5,6 +5,7 @@
 mod band;
 mod build;
 mod files;
+mod fleet;
 mod monte_carlo;
 mod output;
 mod plot;
@@ -37,6 +38,8 @@ enum Command {
     Synth(synth::SynthArgs),
     /// Run the grid with no response, the baseline droop or the firmware on a table
     Simulate(simulate::SimulateArgs),
+    /// Run every charger with its own firmware, meter, clock and faults
+    Fleet(fleet::FleetArgs),
     /// One HTML page with the figures of the paper and more, and each figure as .svg and .csv
     Report(report::ReportArgs),
     /// Run the firmware on a recorded frequency
@@ -147,6 +150,7 @@ pub fn run() -> ExitCode {
         Command::Build(args) => build::run(&args),
         Command::Synth(args) => synth::run(&args),
         Command::Simulate(args) => simulate::run(&args),
+        Command::Fleet(args) => fleet::run(&args),
         Command::Report(args) => report::run(&args),
         Command::Replay(args) => replay::run(&args),
         Command::Verify(args) => verify::run(&args),
