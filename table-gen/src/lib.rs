@@ -15,12 +15,14 @@
 //! | [`simulation`] | a table, or a baseline | the grid's frequency in time |
 //! | [`fleet`] | a table | the same with one firmware for each charger |
 //! | [`replay`] | a recorded frequency | what the firmware would have done |
+//! | [`counterfactual`] | a recorded event | what it would have been with the chargers |
 //! | [`report`] | runs and findings | one HTML page and its figures |
 //! | [`cli`] | arguments | all of the above |
 #![forbid(unsafe_code)]
 
 pub mod abstraction;
 pub mod cli;
+pub mod counterfactual;
 pub mod emit;
 pub mod fleet;
 pub mod flow;
