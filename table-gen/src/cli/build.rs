@@ -11,6 +11,7 @@ use super::synth::SynthReport;
 use super::{Failure, OutputArgs, SpecArgs, output, progress, simulate};
 use crate::compress::{LawReport, Options};
 use crate::pipeline::{self, Encoding};
+use crate::report::{self, Findings};
 use crate::simulation::closed_loop::{self, Estimator};
 use crate::simulation::monitor::Summary;
 use crate::simulation::scenario::Scenario;
@@ -98,7 +99,7 @@ pub(super) fn run(args: &BuildArgs) -> Result<(), Failure> {
         TableView::parse(&bytes).map_err(|error| Failure::BadInput(format!("{error:?}")))?;
     let run = closed_loop::simulate(&spec, &table, &Scenario::of(&spec), Estimator::FullState)
         .map_err(Failure::bad)?;
-    let report = BuildReport {
+    let result = BuildReport {
         synth: &synth,
         spec_hash: hex(&spec.hash()),
         table_bytes: bytes.len(),
@@ -106,9 +107,12 @@ pub(super) fn run(args: &BuildArgs) -> Result<(), Failure> {
         simulation: &run.summary,
         phases: &run.phases,
     };
-    let json = serde_json::to_string_pretty(&report).map_err(Failure::bad)?;
+    let json = serde_json::to_string_pretty(&result).map_err(Failure::bad)?;
+    let findings = Findings::default();
+    let page = report::render(&spec, &bytes, &[], &findings, Vec::new()).map_err(Failure::bad)?;
     let files = [
         ("table.bin", bytes.as_slice()),
+        ("report.html", page.html.as_bytes()),
         ("build.json", json.as_bytes()),
     ];
     write_all(&args.out, &files)?;
@@ -117,7 +121,7 @@ pub(super) fn run(args: &BuildArgs) -> Result<(), Failure> {
         return Ok(());
     }
     synth.print();
-    print_encodings(&report);
+    print_encodings(&result);
     simulate::summary(&run.summary);
     simulate::phases(&run.phases);
     output::line(format_args!("wrote {}", args.out.display()));
