@@ -1,16 +1,17 @@
 //! `build SPEC`: the whole way, and its files.
-//!
-//! Files are written into a temporary folder beside the target and moved when all of them are complete: an interruption
-//! or a failure leaves nothing behind.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
-use firmware::table::{Law, TableView};
+use clap::ValueEnum;
+use firmware::table::{InputsKind, Law, TableView};
 use serde::Serialize;
 
+use super::files::write_all;
 use super::synth::SynthReport;
 use super::{Failure, OutputArgs, SpecArgs, output, progress, simulate};
-use crate::pipeline;
+use crate::compress::{LawReport, Options};
+use crate::pipeline::{self, Encoding};
+use crate::report::{self, Findings};
 use crate::simulation::closed_loop::{self, Estimator};
 use crate::simulation::monitor::Summary;
 use crate::simulation::scenario::Scenario;
@@ -27,15 +28,52 @@ pub(super) struct BuildArgs {
     /// Folder for the files; made if it does not exist
     #[arg(long, value_name = "DIR", default_value = "out")]
     out: PathBuf,
+    /// How the laws are stored; dense is large, and there to compare with
+    #[arg(long, value_enum, default_value = "tree")]
+    encoding: EncodingArg,
+    /// Let the tree choose among the fastest inputs only: larger, fewest worst-case steps
+    #[arg(long)]
+    keep_minimal_time: bool,
+    /// Keep every winning cell, whatever the domain's bytes
+    #[arg(long)]
+    exact_domain: bool,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum EncodingArg {
+    /// Trees and affine laws
+    Tree,
+    /// Bit-packed arrays
+    Dense,
+}
+
+impl BuildArgs {
+    fn encoding(&self) -> Encoding {
+        match self.encoding {
+            EncodingArg::Dense => Encoding::Dense,
+            EncodingArg::Tree => Encoding::Tree(Options {
+                keep_minimal_time: self.keep_minimal_time,
+                exact_domain: self.exact_domain,
+            }),
+        }
+    }
 }
 
 #[derive(Debug, Serialize)]
 struct EncodingReport {
     phase: &'static str,
-    encoding: String,
+    encoding: &'static str,
     bytes: u32,
+    domain_bytes: u32,
+    inputs_bytes: u32,
     entries: u32,
     worst_visits: u16,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    domain_cells: Option<usize>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    worst_steps: Option<u16>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    worst_steps_minimal: Option<u16>,
 }
 
 #[derive(Debug, Serialize)]
@@ -55,22 +93,26 @@ pub(super) fn run(args: &BuildArgs) -> Result<(), Failure> {
     progress::catch_interrupts();
     let synthesis = synthesis::synthesise(&spec, &progress::watch)?;
     let synth = SynthReport::new(&spec, &synthesis);
-    let bytes = pipeline::emit(&spec, &synthesis).map_err(Failure::bad)?;
+    let emitted = pipeline::emit(&spec, &synthesis, args.encoding(), &progress::watch)?;
+    let bytes = emitted.bytes;
     let table =
         TableView::parse(&bytes).map_err(|error| Failure::BadInput(format!("{error:?}")))?;
     let run = closed_loop::simulate(&spec, &table, &Scenario::of(&spec), Estimator::FullState)
         .map_err(Failure::bad)?;
-    let report = BuildReport {
+    let result = BuildReport {
         synth: &synth,
         spec_hash: hex(&spec.hash()),
         table_bytes: bytes.len(),
-        encodings: encodings(&table),
+        encodings: encodings(&table, &emitted.laws),
         simulation: &run.summary,
         phases: &run.phases,
     };
-    let json = serde_json::to_string_pretty(&report).map_err(Failure::bad)?;
+    let json = serde_json::to_string_pretty(&result).map_err(Failure::bad)?;
+    let findings = Findings::default();
+    let page = report::render(&spec, &bytes, &[], &findings, Vec::new()).map_err(Failure::bad)?;
     let files = [
         ("table.bin", bytes.as_slice()),
+        ("report.html", page.html.as_bytes()),
         ("build.json", json.as_bytes()),
     ];
     write_all(&args.out, &files)?;
@@ -79,39 +121,66 @@ pub(super) fn run(args: &BuildArgs) -> Result<(), Failure> {
         return Ok(());
     }
     synth.print();
-    print_encodings(&report);
+    print_encodings(&result);
     simulate::summary(&run.summary);
     simulate::phases(&run.phases);
     output::line(format_args!("wrote {}", args.out.display()));
     Ok(())
 }
 
-fn encodings(table: &TableView<'_>) -> Vec<EncodingReport> {
+fn encodings(table: &TableView<'_>, reports: &[(Law, LawReport)]) -> Vec<EncodingReport> {
     let laws = [(Law::C1, "C1"), (Law::C2, "C2"), (Law::Hold, "Hold")];
     laws.into_iter()
         .filter_map(|(law, phase)| {
             let view = table.law(law)?;
             let entry = table.header().laws[law as usize]?;
+            let report = reports.iter().find(|(of, _)| *of == law).map(|(_, r)| r);
             Some(EncodingReport {
                 phase,
-                encoding: format!("{:?}", entry.inputs_kind),
+                encoding: if entry.inputs_kind == InputsKind::Dense as u8 {
+                    "dense"
+                } else {
+                    "tree"
+                },
                 bytes: entry.domain_len + entry.inputs_len,
+                domain_bytes: entry.domain_len,
+                inputs_bytes: entry.inputs_len,
                 entries: view.encoding().entries(),
-                worst_visits: view.encoding().worst_visits(),
+                worst_visits: entry.worst_visits,
+                domain_cells: report.map(|r| r.domain_cells),
+                worst_steps: report.map(|r| r.steps),
+                worst_steps_minimal: report.map(|r| r.steps_minimal),
             })
         })
         .collect()
 }
 
 fn print_encodings(report: &BuildReport<'_>) {
-    let mut table = output::table(&["law", "encoding", "bytes", "entries", "worst visits"]);
+    let mut table = output::table(&[
+        "law",
+        "encoding",
+        "domain bytes",
+        "inputs bytes",
+        "entries",
+        "worst visits",
+        "cells covered",
+        "worst steps (fastest)",
+    ]);
     for row in &report.encodings {
+        let steps = match (row.worst_steps, row.worst_steps_minimal) {
+            (Some(steps), Some(minimal)) => format!("{steps} ({minimal})"),
+            _ => "-".to_owned(),
+        };
         table.add_row(vec![
             row.phase.to_owned(),
-            row.encoding.clone(),
-            output::grouped(row.bytes as usize),
+            row.encoding.to_owned(),
+            output::grouped(row.domain_bytes as usize),
+            output::grouped(row.inputs_bytes as usize),
             output::grouped(row.entries as usize),
             row.worst_visits.to_string(),
+            row.domain_cells
+                .map_or_else(|| "-".to_owned(), output::grouped),
+            steps,
         ]);
     }
     output::line(table);
@@ -124,29 +193,4 @@ fn print_encodings(report: &BuildReport<'_>) {
 /// Lower-case hexadecimal.
 pub(super) fn hex(bytes: &[u8]) -> String {
     bytes.iter().map(|byte| format!("{byte:02x}")).collect()
-}
-
-/// Writes all files or none.
-fn write_all(dir: &Path, files: &[(&str, &[u8])]) -> Result<(), Failure> {
-    let fail = |path: &Path, error: std::io::Error| {
-        Failure::BadInput(format!("{}: {error}", path.display()))
-    };
-    std::fs::create_dir_all(dir).map_err(|error| fail(dir, error))?;
-    // In the target's own folder, so that the moves stay on one file system.
-    let staging = tempfile::Builder::new()
-        .prefix(".partial-")
-        .tempdir_in(dir)
-        .map_err(|error| fail(dir, error))?;
-    for (name, bytes) in files {
-        let path = staging.path().join(name);
-        std::fs::write(&path, bytes).map_err(|error| fail(&path, error))?;
-    }
-    if progress::interrupted() {
-        return Err(Failure::No("interrupted; nothing was written".to_owned()));
-    }
-    for (name, _) in files {
-        let to = dir.join(name);
-        std::fs::rename(staging.path().join(name), &to).map_err(|error| fail(&to, error))?;
-    }
-    Ok(())
 }

@@ -1,4 +1,4 @@
-//! `simulate SPEC`: one run of the grid.
+//! `simulate SPEC`: one run of the grid, or many.
 
 use std::path::PathBuf;
 
@@ -6,13 +6,20 @@ use clap::ValueEnum;
 use firmware::table::TableView;
 use serde::Serialize;
 
-use super::{Failure, OutputArgs, SpecArgs, output, progress};
+use super::band::{Band, PerState};
+use super::{Failure, OutputArgs, SpecArgs, monte_carlo, output, plot, progress};
 use crate::pipeline;
-use crate::simulation::closed_loop::{self, Estimator};
+use crate::plant::GridPlant;
+use crate::simulation::beyond::Disturbances;
+use crate::simulation::beyond::file::ScenarioFile;
+use crate::simulation::beyond::grid::BeyondGrid;
+use crate::simulation::beyond::plant::BeyondPlant;
+use crate::simulation::closed_loop::{ClosedLoop, Estimator};
 use crate::simulation::monitor::Summary;
+use crate::simulation::recorder::History;
 use crate::simulation::scenario::Scenario;
 use crate::simulation::trajectory::{PhaseSpan, Run};
-use crate::simulation::{ControllerKind, baseline};
+use crate::simulation::{ControllerKind, NOMINAL_HZ, baseline};
 use crate::spec::Spec;
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -31,115 +38,254 @@ pub(super) struct SimulateArgs {
     #[command(flatten)]
     spec: SpecArgs,
     #[command(flatten)]
-    output: OutputArgs,
+    pub(super) output: OutputArgs,
+    #[command(flatten)]
+    pub(super) chances: Chances,
     /// Who controls the chargers
     #[arg(long, value_enum, default_value = "symbolic")]
     controller: ControllerArg,
-    /// Lost infeed [GW]; default: the middle of the spec's band
-    #[arg(long, value_name = "GW", allow_negative_numbers = true)]
-    loss_gw: Option<f64>,
     /// Dead band of the baseline [Hz]; default: the spec's
     #[arg(long, value_name = "HZ", allow_negative_numbers = true)]
     deadband_hz: Option<f64>,
-    /// Length of the run [s]; default 300
+    /// Length of a run [s]; default 300, with --runs the spec's horizon or 120
     #[arg(long, value_name = "S", allow_negative_numbers = true)]
-    duration_s: Option<f64>,
-    /// Relative error of the delivered participation, drawn each tick; default 0
-    #[arg(long, value_name = "X", allow_negative_numbers = true)]
-    participation_error: Option<f64>,
-    /// Time from a command to its power [s]; default: the spec's
-    #[arg(long, value_name = "S", allow_negative_numbers = true)]
-    delay_s: Option<f64>,
-    /// Seed of what is drawn
+    pub(super) duration_s: Option<f64>,
+    /// Seed of what is drawn; with --runs that of the first run, the next has the next seed
     #[arg(long, value_name = "N", default_value_t = 0)]
-    seed: u64,
+    pub(super) seed: u64,
+    /// Many runs, each drawn from the spec's uncertainty as changed by the options
+    #[arg(long, value_name = "N")]
+    runs: Option<usize>,
+    /// What happens to the grid, and limits of its plant: gb-2019, second-loss, tired-governors, or a TOML file
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["runs", "loss_gw"])]
+    scenario: Option<String>,
     /// Table to run, instead of synthesising one; it must be of this spec
     #[arg(long, value_name = "FILE")]
     table: Option<PathBuf>,
     /// Let the firmware reconstruct the state from frequency alone
     #[arg(long)]
     observer: bool,
+    /// Draw the frequency in the terminal
+    #[arg(long)]
+    plot: bool,
+    /// Write time, frequency, participation and delivered participation of every sample as CSV
+    #[arg(long, value_name = "FILE", conflicts_with = "runs")]
+    csv: Option<PathBuf>,
+}
+
+/// What is uncertain in a run.
+#[derive(Debug, Clone, Copy, clap::Args)]
+pub(super) struct Chances {
+    /// Lost infeed [GW]; default: the middle of the spec's band. With --runs a band LOW,HIGH; default: the spec's
+    #[arg(long, value_name = "GW", allow_hyphen_values = true)]
+    pub(super) loss_gw: Option<Band>,
+    /// Relative error of the delivered participation, drawn each tick; default 0, with --runs the spec's
+    #[arg(long, value_name = "X", allow_negative_numbers = true)]
+    pub(super) participation_error: Option<f64>,
+    /// Error of the measured state, drawn each tick [Hz,GW,GW,GW]; default 0, with --runs the spec's
+    #[arg(long, value_name = "F,G,L,P", allow_hyphen_values = true)]
+    pub(super) measurement_error: Option<PerState>,
+    /// Time from a command to its power [s]; default: the spec's. With --runs also a band LOW,HIGH
+    #[arg(long, value_name = "S", allow_hyphen_values = true)]
+    pub(super) delay_s: Option<Band>,
+}
+
+impl SimulateArgs {
+    /// How the firmware is to know the state.
+    pub(super) fn estimator(&self) -> Estimator {
+        if self.observer {
+            Estimator::Observer
+        } else {
+            Estimator::FullState
+        }
+    }
+
+    /// The spec with the options that change it.
+    fn load(&self) -> Result<Spec, Failure> {
+        let mut set = self.spec.clone();
+        if let Some(hz) = self.deadband_hz {
+            set.overrides
+                .set
+                .push(format!("baseline.deadband_hz={hz:?}"));
+        }
+        set.load()
+    }
+
+    /// The scenario of one run.
+    fn scenario(&self, spec: &Spec, file: Option<&ScenarioFile>) -> Result<Scenario, Failure> {
+        let single = |option: &str, band: Option<Band>, default: f64| match band.map(Band::single) {
+            None => Ok(default),
+            Some(Some(value)) => Ok(value),
+            Some(None) => Err(Failure::BadInput(format!(
+                "{option}: a band is for --runs; allowed: one number"
+            ))),
+        };
+        let mut scenario = Scenario::of(spec);
+        if let Some(file) = file {
+            file.apply(&mut scenario);
+        }
+        let chances = &self.chances;
+        scenario.loss_gw = single("--loss-gw", chances.loss_gw, scenario.loss_gw)?;
+        scenario.delay_s = single("--delay-s", chances.delay_s, scenario.delay_s)?;
+        scenario.duration_s = self.duration_s.unwrap_or(scenario.duration_s);
+        if let Some(error) = chances.participation_error {
+            scenario.participation_error = error;
+        }
+        if let Some(bounds) = chances.measurement_error {
+            scenario.measurement = bounds.0;
+        }
+        scenario.seed = self.seed;
+        scenario.check().map_err(Failure::bad)?;
+        Ok(scenario)
+    }
 }
 
 #[derive(Debug, Serialize)]
 struct SimulateReport<'r> {
     spec: &'r str,
     controller: ControllerKind,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    scenario: Option<&'r str>,
     loss_gw: f64,
     duration_s: f64,
     #[serde(flatten)]
     summary: &'r Summary,
     phases: &'r [PhaseSpan],
+    /// What the proof does not cover; absent without a scenario file.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    outside_proof: Option<&'r [String]>,
 }
 
 /// Runs the command.
 pub(super) fn run(args: &SimulateArgs) -> Result<(), Failure> {
-    let mut set = args.spec.clone();
-    if let Some(hz) = args.deadband_hz {
-        set.overrides
-            .set
-            .push(format!("baseline.deadband_hz={hz:?}"));
+    let spec = args.load()?;
+    if args.runs.is_some() && args.controller != ControllerArg::Symbolic {
+        return Err(Failure::BadInput(
+            "--runs: only with --controller symbolic; the others take no errors".to_owned(),
+        ));
     }
-    let spec = set.load()?;
-    let mut scenario = Scenario::of(&spec);
-    let fields = [
-        (&mut scenario.loss_gw, args.loss_gw),
-        (&mut scenario.duration_s, args.duration_s),
-        (&mut scenario.participation_error, args.participation_error),
-        (&mut scenario.delay_s, args.delay_s),
-    ];
-    for (field, value) in fields {
-        if let Some(value) = value {
-            *field = value;
-        }
+    if args.runs == Some(0) {
+        return Err(Failure::BadInput(
+            "--runs = 0 is out of range: at least 1".to_owned(),
+        ));
     }
-    scenario.seed = args.seed;
-    scenario.check().map_err(Failure::bad)?;
-    let (controller, run) = match args.controller {
-        ControllerArg::None => (
-            ControllerKind::None,
-            baseline::simulate(&spec, &scenario, false),
-        ),
-        ControllerArg::Baseline => (
-            ControllerKind::Baseline,
-            baseline::simulate(&spec, &scenario, true),
-        ),
-        ControllerArg::Symbolic => {
-            progress::catch_interrupts();
-            (ControllerKind::Symbolic, symbolic(&spec, &scenario, args)?)
+    let file = match &args.scenario {
+        Some(name) => Some(ScenarioFile::load(name).map_err(Failure::bad)?),
+        None => None,
+    };
+    let scenario = match args.runs {
+        None => args.scenario(&spec, file.as_ref())?,
+        Some(_) => {
+            let draws = monte_carlo::draws(&spec, &args.chances, args.duration_s)?;
+            draws.scenario(args.seed)
         }
     };
+    let disturbances = match &file {
+        Some(file) => file.disturbances(&spec).map_err(Failure::bad)?,
+        None => Disturbances::step(scenario.loss_gw),
+    };
+    let under = |respond| baseline::simulate_under(&spec, &disturbances, &scenario, respond);
+    let (controller, run) = match args.controller {
+        ControllerArg::None => (ControllerKind::None, under(false)),
+        ControllerArg::Baseline => (ControllerKind::Baseline, under(true)),
+        ControllerArg::Symbolic => {
+            progress::catch_interrupts();
+            let bytes = pipeline::table_bytes(&spec, args.table.as_deref(), &progress::watch)?;
+            let table = TableView::parse(&bytes)
+                .map_err(|error| Failure::BadInput(format!("{error:?}")))?;
+            if let Some(runs) = args.runs.filter(|runs| *runs > 1) {
+                return monte_carlo::run(args, &spec, &table, runs);
+            }
+            let beyond = file.as_ref().map(|_| &disturbances);
+            let run = symbolic(&spec, &table, &scenario, beyond, args.estimator())?;
+            (ControllerKind::Symbolic, run)
+        }
+    };
+    let outside = file.as_ref().map(|_| disturbances.outside_proof(&spec));
     let report = SimulateReport {
         spec: &spec.name,
         controller,
-        loss_gw: scenario.loss_gw,
+        scenario: file.as_ref().map(|file| file.name.as_str()),
+        loss_gw: disturbances.losses.iter().map(|loss| loss.power_gw).sum(),
         duration_s: scenario.duration_s,
         summary: &run.summary,
         phases: &run.phases,
+        outside_proof: outside.as_deref(),
     };
-    if args.output.json {
-        output::json(&report)
-    } else {
-        print(&report, &run);
-        Ok(())
+    if let Some(path) = &args.csv {
+        write_csv(path, &run)?;
     }
-}
-
-fn symbolic(spec: &Spec, scenario: &Scenario, args: &SimulateArgs) -> Result<Run, Failure> {
-    let bytes = pipeline::table_bytes(spec, args.table.as_deref(), &progress::watch)?;
-    let table =
-        TableView::parse(&bytes).map_err(|error| Failure::BadInput(format!("{error:?}")))?;
-    let estimator = if args.observer {
-        Estimator::Observer
-    } else {
-        Estimator::FullState
-    };
-    closed_loop::simulate(spec, &table, scenario, estimator).map_err(Failure::bad)
-}
-
-fn print(report: &SimulateReport<'_>, run: &Run) {
+    if args.output.json {
+        return output::json(&report);
+    }
     summary(report.summary);
     phases(&run.phases);
+    for sentence in outside.iter().flatten() {
+        output::line(format_args!("outside the proof: {sentence}"));
+    }
+    if args.plot {
+        output::line(plot::frequency(&frequency(&run), &levels_hz(&spec)));
+    }
+    Ok(())
+}
+
+/// One run of the firmware, on the spec's plant or beyond it.
+fn symbolic(
+    spec: &Spec,
+    table: &TableView<'_>,
+    scenario: &Scenario,
+    beyond: Option<&Disturbances>,
+    estimator: Estimator,
+) -> Result<Run, Failure> {
+    let mut closed_loop = ClosedLoop::new(spec, table, estimator).map_err(Failure::bad)?;
+    let mut history = History::default();
+    let summary = match beyond {
+        None => closed_loop.run(scenario, &mut history),
+        Some(disturbances) => {
+            let (grid, seed) = (GridPlant::new(spec), scenario.seed);
+            let plant = BeyondPlant::new(grid, disturbances, scenario.duration_s + 1.0, seed);
+            let (_, parts) = closed_loop.parts(scenario);
+            let mut grid = BeyondGrid::new(plant, parts, scenario.initial);
+            closed_loop.run_on(&mut grid, scenario, &mut history)
+        }
+    };
+    Ok(Run {
+        samples: history.samples,
+        phases: history.phases,
+        summary,
+    })
+}
+
+/// Time and absolute frequency of a run's samples.
+pub(super) fn frequency(run: &Run) -> Vec<(f64, f64)> {
+    let point = |sample: &crate::simulation::trajectory::Sample| {
+        (sample.time_s, NOMINAL_HZ + sample.state[0])
+    };
+    run.samples.iter().map(point).collect()
+}
+
+/// Levels that a plot marks: the lower ends of I1 and I2, and the containment \[Hz\].
+pub(super) fn levels_hz(spec: &Spec) -> Vec<f64> {
+    let requirements = &spec.requirements;
+    [requirements.outer_hz[0], requirements.inner_hz[0]]
+        .into_iter()
+        .chain(requirements.containment_hz)
+        .map(|deviation| NOMINAL_HZ + deviation)
+        .collect()
+}
+
+fn write_csv(path: &std::path::Path, run: &Run) -> Result<(), Failure> {
+    let fail =
+        |error: &dyn std::fmt::Display| Failure::BadInput(format!("{}: {error}", path.display()));
+    let mut writer = csv::Writer::from_path(path).map_err(|e| fail(&e))?;
+    let columns = ["time_s", "frequency_hz", "participation", "delivered"];
+    writer.write_record(columns).map_err(|e| fail(&e))?;
+    for sample in &run.samples {
+        let f = NOMINAL_HZ + sample.state[0];
+        let row = [sample.time_s, f, sample.participation, sample.delivered];
+        writer.serialize(row).map_err(|e| fail(&e))?;
+    }
+    writer.flush().map_err(|e| fail(&e))
 }
 
 /// A summary as a table on stdout.
@@ -178,9 +324,14 @@ pub(super) fn summary(summary: &Summary) {
             format!("{} s", output::seconds(summary.entered_inner_s)),
         ),
         ("stayed in I2", yes(summary.stayed_in_inner)),
+        ("satisfies psi", yes(summary.satisfies_psi)),
     ];
     for (name, value) in rows {
         table.add_row(vec![name.to_owned(), value]);
+    }
+    if summary.fallback_s > 0.0 {
+        let value = format!("{:.1} s", summary.fallback_s);
+        table.add_row(vec!["droop as the fallback".to_owned(), value]);
     }
     output::line(table);
 }

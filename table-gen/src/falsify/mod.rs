@@ -181,7 +181,10 @@ mod tests {
         let spec = small(&[]);
         let unwatched = |_: &'static str| Box::new(Unwatched) as Box<dyn Watch>;
         let laws = synthesis::synthesise(&spec, &unwatched).unwrap();
-        let bytes = pipeline::emit(&spec, &laws).unwrap();
+        let dense = pipeline::Encoding::Dense;
+        let bytes = pipeline::emit(&spec, &laws, dense, &unwatched)
+            .unwrap()
+            .bytes;
         let stands = falsify(&bytes, &spec, 200_000, 1).unwrap();
         assert_eq!(stands.violation, None);
         assert!(stands.smallest_margin_hz > 0.0 && stands.steps >= 200_000);

@@ -16,9 +16,10 @@
 
 use super::formula::{Comparison, Formula, Interval, Signal};
 use crate::spec::Spec;
+use serde::Serialize;
 
 /// What a formula asks of a spec; `None` leaves the spec's own value.
-#[derive(Debug, Clone, PartialEq, Default)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize)]
 pub struct Compiled {
     /// `requirements.containment_hz`.
     pub containment_hz: Option<f64>,

@@ -8,6 +8,8 @@
 //! error away from the kinks is about (h / T_ev)⁵ / 120 = 2e-10, and at a kink h² times the change of slope, 1e-6 times
 //! a slope in q of at most 1/s: below the printed digits.
 
+use super::beyond::Disturbances;
+use super::beyond::plant::{BeyondPlant, runge_kutta};
 use super::monitor::{Knot, Monitor};
 use super::scenario::Scenario;
 use super::trajectory::{Run, Sample};
@@ -21,18 +23,22 @@ const STEPS_PER_SAMPLE: usize = 10;
 
 /// Simulates the plant with the baseline, or without any response (`respond` false).
 pub fn simulate(spec: &Spec, scenario: &Scenario, respond: bool) -> Run {
-    let plant = GridPlant::new(spec);
+    let disturbances = Disturbances::step(scenario.loss_gw);
+    simulate_under(spec, &disturbances, scenario, respond)
+}
+
+/// The same under any disturbances, which replace the scenario's loss. Losses come at whole milliseconds: on a step's end.
+pub fn simulate_under(
+    spec: &Spec,
+    disturbances: &Disturbances,
+    scenario: &Scenario,
+    respond: bool,
+) -> Run {
+    let grid = GridPlant::new(spec);
+    let plant = BeyondPlant::new(grid, disturbances, scenario.duration_s, scenario.seed);
     let baseline = &spec.baseline;
     let lag = baseline.time_s;
     let participation = |q: f64| if respond { q.clamp(0.0, 1.0) } else { 0.0 };
-    let derivative = |y: &[f64; STATES + 1]| {
-        let x = [y[0], y[1], y[2], y[3]];
-        let q = y[STATES];
-        let net = plant.fleet * participation(q) - scenario.loss_gw;
-        let [df, dg, dl, dp] = plant.derivative(x, net);
-        let e = (-x[0] - baseline.deadband_hz).max(0.0) / baseline.droop_hz;
-        [df, dg, dl, dp, (e - plant.damping * q) / lag]
-    };
     let steps = (scenario.duration_s / STEP_S).round().max(1.0) as usize;
     let h = scenario.duration_s / steps as f64;
     let [f, g, l, p] = scenario.initial;
@@ -41,6 +47,15 @@ pub fn simulate(spec: &Spec, scenario: &Scenario, respond: bool) -> Run {
     let mut samples = Vec::with_capacity(steps / STEPS_PER_SAMPLE + 2);
     for step in 0..=steps {
         let time_s = h * step as f64;
+        let drive = plant.drive(time_s + 0.5 * h);
+        let derivative = |y: &[f64; STATES + 1]| {
+            let x = [y[0], y[1], y[2], y[3]];
+            let q = y[STATES];
+            let power = grid.fleet * participation(q);
+            let [df, dg, dl, dp] = plant.derivative(&x, &drive, power);
+            let e = (-x[0] - baseline.deadband_hz).max(0.0) / baseline.droop_hz;
+            [df, dg, dl, dp, (e - grid.damping * q) / lag]
+        };
         let slope = derivative(&y);
         let u = participation(y[STATES]);
         monitor.participation(u);
@@ -59,6 +74,9 @@ pub fn simulate(spec: &Spec, scenario: &Scenario, respond: bool) -> Run {
         }
         if step < steps {
             y = runge_kutta(&derivative, &y, slope, h);
+            let mut x = [y[0], y[1], y[2], y[3]];
+            plant.limit(&mut x);
+            y[..STATES].copy_from_slice(&x);
         }
     }
     Run {
@@ -66,18 +84,4 @@ pub fn simulate(spec: &Spec, scenario: &Scenario, respond: bool) -> Run {
         phases: Vec::new(),
         summary: monitor.summary(),
     }
-}
-
-/// One step of the classical Runge-Kutta method; `k1` is the slope at `y`.
-fn runge_kutta<const N: usize>(
-    derivative: &impl Fn(&[f64; N]) -> [f64; N],
-    y: &[f64; N],
-    k1: [f64; N],
-    h: f64,
-) -> [f64; N] {
-    let along = |k: &[f64; N], h: f64| std::array::from_fn(|i| y[i] + h * k[i]);
-    let k2 = derivative(&along(&k1, 0.5 * h));
-    let k3 = derivative(&along(&k2, 0.5 * h));
-    let k4 = derivative(&along(&k3, h));
-    std::array::from_fn(|i| y[i] + h / 6.0 * (k1[i] + 2.0 * k2[i] + 2.0 * k3[i] + k4[i]))
 }

@@ -1,24 +1,28 @@
-//! The firmware's own control loop against the plant, from the bytes of a table.
+//! The firmware's own control loop against a grid, from the bytes of a table.
 //!
-//! Time goes in ticks of the table. At each tick the state is measured (floored to micro-units, as the device stores
-//! it), the firmware answers, and the plant takes exact steps until the next tick. With an actuation delay the command
-//! acts later; a delay that is no whole number of ticks splits each tick in two.
+//! Time goes in ticks of the table. At each tick the state is measured (with this run's measurement error, floored to
+//! micro-units, as the device stores it), the firmware answers, and the grid moves to the next tick. With an actuation
+//! delay the command acts later; a delay that is no whole number of ticks splits each tick in two. The first tick comes
+//! `event_offset_s` after the event.
 
-use std::collections::VecDeque;
-
-use firmware::control_loop::ControlLoop;
+use firmware::control_loop::{Action, ControlLoop};
 use firmware::observer::{Observer, ObserverConfig, ObserverError};
+use firmware::phase::Phase;
 use firmware::table::TableView;
 use firmware::units::{MICRO, State};
-use rand::{RngExt, SeedableRng};
-use rand_pcg::Pcg64;
 
-use super::monitor::{Knot, Monitor};
+use super::chance::Chance;
+use super::grid::{Grid, LinearGrid, Part, PartLengths};
+use super::monitor::{Monitor, Summary};
 use super::propagator::Propagator;
+use super::recorder::{History, Recorder};
 use super::scenario::Scenario;
-use super::trajectory::{PhaseSpan, Run, Sample, extend_phases};
+use super::trajectory::{Run, Sample};
 use crate::plant::{GridPlant, STATES};
 use crate::spec::Spec;
+
+/// Shorter parts of a tick are rounding dust \[s\].
+const DUST_S: f64 = 1e-9;
 
 /// How the firmware comes to know the grid state.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -38,31 +42,156 @@ pub enum LoopError {
 }
 
 /// A state as the device stores it.
+#[inline]
 pub fn measured(x: &[f64; STATES]) -> State {
     // Saturates far outside every grid.
     State(x.map(|value| (value * f64::from(MICRO)).floor() as i32))
 }
 
-/// Propagators of a tick that is split by the delay.
-struct Steps {
-    /// Part of a tick in which the older command still acts, and the steps through both parts.
-    early: Option<Propagator>,
-    late: Option<Propagator>,
-    early_s: f64,
+/// Firmware, grid parameters and buffers; made once and run as often as wanted without allocating.
+#[derive(Debug, Clone)]
+pub struct ClosedLoop<'t> {
+    plant: GridPlant,
+    tick_s: f64,
+    tick_step: Propagator,
+    monitor: Monitor,
+    firmware: ControlLoop<'t>,
+    observer: Option<(ObserverConfig, firmware::table::PlantParameters)>,
+    /// Commands on their way, oldest at `at`.
+    pending: Vec<f64>,
+    at: usize,
 }
 
-impl Steps {
-    fn new(plant: &GridPlant, tick_s: f64, remainder_s: f64) -> Self {
-        let part = |time_s: f64| (time_s > 0.0).then(|| Propagator::new(plant, time_s));
-        Self {
-            early: part(remainder_s),
-            late: part(tick_s - remainder_s),
-            early_s: remainder_s,
+impl<'t> ClosedLoop<'t> {
+    /// The firmware on a table, against a spec's plant.
+    ///
+    /// # Errors
+    /// A plant that the observer cannot follow, if it is asked for.
+    pub fn new(
+        spec: &Spec,
+        table: &TableView<'t>,
+        estimator: Estimator,
+    ) -> Result<Self, LoopError> {
+        let header = table.header();
+        let plant = GridPlant::new(spec);
+        let tick_s = f64::from(header.tick_ms) / 1000.0;
+        let observer = match estimator {
+            Estimator::FullState => None,
+            Estimator::Observer => {
+                let config = ObserverConfig::new(&header.plant, header.tick_ms)
+                    .map_err(LoopError::Observer)?;
+                Some((config, header.plant))
+            }
+        };
+        Ok(Self {
+            plant,
+            tick_s,
+            tick_step: Propagator::new(&plant, tick_s),
+            monitor: Monitor::new(spec),
+            firmware: ControlLoop::with_table(Ok(table.clone())),
+            observer,
+            pending: Vec::new(),
+            at: 0,
+        })
+    }
+
+    /// Whole ticks of a delay, and the lengths of the parts of a tick.
+    pub fn parts(&self, scenario: &Scenario) -> (usize, PartLengths) {
+        let whole = (scenario.delay_s / self.tick_s + DUST_S).floor();
+        let early = scenario.delay_s - whole * self.tick_s;
+        let early = if early < DUST_S { 0.0 } else { early };
+        let parts = [scenario.event_offset_s, early, self.tick_s - early];
+        (whole as usize, parts)
+    }
+
+    /// One run on the spec's linear plant.
+    pub fn run(&mut self, scenario: &Scenario, recorder: &mut impl Recorder) -> Summary {
+        let (_, parts) = self.parts(scenario);
+        let (loss, initial) = (scenario.loss_gw, scenario.initial);
+        let mut grid = LinearGrid::new(self.plant, &self.tick_step, parts, loss, initial);
+        self.run_on(&mut grid, scenario, recorder)
+    }
+
+    /// One run on any grid. `scenario.loss_gw` and `scenario.initial` are the grid's own matter.
+    pub fn run_on(
+        &mut self,
+        grid: &mut impl Grid,
+        scenario: &Scenario,
+        recorder: &mut impl Recorder,
+    ) -> Summary {
+        let (whole, lengths) = self.parts(scenario);
+        let early_s = lengths[Part::Early as usize];
+        self.pending.clear();
+        self.pending.resize(whole + 1, 0.0);
+        self.at = 0;
+        self.firmware.reset();
+        let mut observer = self.observer.as_ref().map(|(config, parameters)| {
+            let f_uhz = measured(&grid.state()).frequency_uhz();
+            Observer::at_rest(*config, parameters, f_uhz)
+        });
+        let mut chance = Chance::new(scenario);
+        let mut monitor = self.monitor;
+        let fleet_gw = self.plant.fleet;
+        let ticks = (scenario.duration_s / self.tick_s).ceil().max(1.0) as usize;
+        grid.advance(Part::Offset, 0.0, 0.0, &mut monitor);
+        for tick in 0..=ticks {
+            let time_s = scenario.event_offset_s + tick as f64 * self.tick_s;
+            let x = grid.state();
+            let state = measured(&chance.measure(x));
+            let state = match &mut observer {
+                None => state,
+                Some(observer) => observer.step(state.frequency_uhz()),
+            };
+            let action = self.firmware.step(state);
+            let command = participation(&action);
+            let (older, newer) = self.send(command);
+            let error = chance.participation();
+            let delivered = |u: f64| (u * (1.0 + error)).clamp(0.0, 1.0);
+            monitor.participation(command);
+            if action.phase == Phase::Fallback {
+                monitor.fallback(self.tick_s);
+            }
+            let sample = Sample {
+                time_s,
+                state: x,
+                participation: command,
+                delivered: delivered(if early_s > 0.0 { older } else { newer }),
+            };
+            let last = tick == ticks;
+            recorder.tick(&sample, &action, if last { 0.0 } else { self.tick_s });
+            if last {
+                break;
+            }
+            let power = |u: f64| fleet_gw * delivered(u);
+            if early_s > 0.0 {
+                grid.advance(Part::Early, time_s, power(older), &mut monitor);
+            }
+            let late_s = time_s + early_s;
+            grid.advance(Part::Late, late_s, power(newer), &mut monitor);
         }
+        monitor.summary()
+    }
+
+    /// Sends a command on its way; returns what acts before and after the part of a tick that the delay leaves over.
+    #[inline]
+    fn send(&mut self, command: f64) -> (f64, f64) {
+        let older = std::mem::replace(&mut self.pending[self.at], command);
+        self.at += 1;
+        if self.at == self.pending.len() {
+            self.at = 0;
+        }
+        // The next oldest; without whole ticks of delay that is the command itself.
+        (older, self.pending[self.at])
     }
 }
 
-/// Runs the firmware on a table against a spec's plant.
+/// Participation that an action asks for, 0..=1.
+#[inline]
+pub fn participation(action: &Action) -> f64 {
+    f64::from(action.participation.ppm()) / f64::from(MICRO)
+}
+
+/// Runs the firmware on a table against a spec's plant, with all that happened.
 ///
 /// # Errors
 /// A plant that the observer cannot follow, if it is asked for.
@@ -72,94 +201,11 @@ pub fn simulate(
     scenario: &Scenario,
     estimator: Estimator,
 ) -> Result<Run, LoopError> {
-    let plant = GridPlant::new(spec);
-    let tick_s = f64::from(table.header().tick_ms) / 1000.0;
-    let whole = (scenario.delay_s / tick_s + 1e-9).floor();
-    // What is left after whole ticks; rounding dust counts as none.
-    let remainder_s = (scenario.delay_s - whole * tick_s).max(0.0);
-    let remainder_s = if remainder_s < 1e-9 { 0.0 } else { remainder_s };
-    let steps = Steps::new(&plant, tick_s, remainder_s);
-    let mut observer = match estimator {
-        Estimator::FullState => None,
-        Estimator::Observer => {
-            let parameters = &table.header().plant;
-            let config = ObserverConfig::new(parameters, table.header().tick_ms)
-                .map_err(LoopError::Observer)?;
-            let f_uhz = measured(&scenario.initial).frequency_uhz();
-            Some(Observer::at_rest(config, parameters, f_uhz))
-        }
-    };
-    let mut firmware = ControlLoop::with_table(Ok(table.clone()));
-    let mut random = Pcg64::seed_from_u64(scenario.seed);
-    let mut draw = || {
-        if scenario.participation_error == 0.0 {
-            0.0
-        } else {
-            random.random_range(-scenario.participation_error..=scenario.participation_error)
-        }
-    };
-    let mut monitor = Monitor::new(spec);
-    let mut phases: Vec<PhaseSpan> = Vec::new();
-    let ticks = (scenario.duration_s / tick_s).ceil().max(1.0) as usize;
-    let mut samples = Vec::with_capacity(ticks + 1);
-    // Commands on their way: `whole` ticks old at the front, plus one for the part of a tick.
-    let mut pending: VecDeque<f64> = VecDeque::from(vec![0.0; whole as usize + 1]);
-    let mut x = scenario.initial;
-    let net = |u: f64| plant.fleet * u - scenario.loss_gw;
-    for tick in 0..=ticks {
-        let time_s = tick as f64 * tick_s;
-        let state = measured(&x);
-        let state = match &mut observer {
-            None => state,
-            Some(observer) => observer.step(state.frequency_uhz()),
-        };
-        let action = firmware.step(state);
-        let command = f64::from(action.participation.ppm()) / f64::from(MICRO);
-        pending.push_back(command);
-        let older = pending.pop_front().unwrap_or(0.0);
-        let newer = pending.front().copied().unwrap_or(command);
-        let error = draw();
-        let delivered = |u: f64| (u * (1.0 + error)).clamp(0.0, 1.0);
-        monitor.participation(command);
-        samples.push(Sample {
-            time_s,
-            state: x,
-            participation: command,
-            delivered: delivered(if steps.early.is_some() { older } else { newer }),
-        });
-        if tick == ticks {
-            monitor.knot(knot(&plant, time_s, &x, net(delivered(newer))));
-            break;
-        }
-        extend_phases(&mut phases, action.phase, time_s, time_s + tick_s);
-        let mut at = time_s;
-        let parts = [
-            (&steps.early, older, steps.early_s),
-            (&steps.late, newer, tick_s - steps.early_s),
-        ];
-        for (propagator, u, length_s) in parts {
-            let Some(propagator) = propagator else {
-                continue;
-            };
-            let power = net(delivered(u));
-            // The slope jumps with the power: each part starts with a knot of its own.
-            monitor.knot(knot(&plant, at, &x, power));
-            x = propagator.step(&x, power);
-            at += length_s;
-            monitor.knot(knot(&plant, at, &x, power));
-        }
-    }
+    let mut history = History::default();
+    let summary = ClosedLoop::new(spec, table, estimator)?.run(scenario, &mut history);
     Ok(Run {
-        samples,
-        phases,
-        summary: monitor.summary(),
+        samples: history.samples,
+        phases: history.phases,
+        summary,
     })
-}
-
-fn knot(plant: &GridPlant, time_s: f64, x: &[f64; STATES], net_power: f64) -> Knot {
-    Knot {
-        time_s,
-        f: x[0],
-        df: plant.derivative(*x, net_power)[0],
-    }
 }

@@ -2,17 +2,25 @@
 //!
 //! | module | holds |
 //! |---|---|
-//! | [`propagator`] | the exact discrete step of the linear plant |
+//! | [`scenario`] | what happens to the grid in a run |
+//! | [`chance`] | what is drawn at each tick |
+//! | [`propagator`], [`grid`] | the exact discrete step of the linear plant |
+//! | [`beyond`] | a plant that is wrong in other ways: not linear, simulation only |
 //! | [`baseline`] | the continuous loop with the baseline droop, which is not linear |
 //! | [`closed_loop`] | the firmware's own loop on the emitted bytes |
 //! | [`monitor`] | nadir, times, bands: one meter for all of them |
-//! | [`scenario`] | what happens to the grid |
-//! | [`trajectory`] | the recorded samples |
+//! | [`recorder`], [`trajectory`] | what is kept of a run |
+//! | [`monte_carlo`] | many runs, and what they have in common |
 
 pub mod baseline;
+pub mod beyond;
+pub mod chance;
 pub mod closed_loop;
+pub mod grid;
 pub mod monitor;
+pub mod monte_carlo;
 pub mod propagator;
+pub mod recorder;
 pub mod scenario;
 pub mod trajectory;
 

@@ -11,8 +11,12 @@ pub struct Scenario {
     pub duration_s: f64,
     /// Relative error of the delivered participation; each tick draws uniformly from ± this.
     pub participation_error: f64,
+    /// Error of the measured state (f, g, l, p); each tick draws uniformly from ± this \[Hz, GW\].
+    pub measurement: [f64; 4],
     /// Time from a command to its power \[s\].
     pub delay_s: f64,
+    /// Time from the event to the firmware's first tick \[s\].
+    pub event_offset_s: f64,
     /// Seed of everything that is drawn.
     pub seed: u64,
     /// Grid state when the event comes (f, g, l, p) \[Hz, GW\].
@@ -45,6 +49,8 @@ impl Scenario {
             loss_gw: 0.5 * (low + high),
             duration_s: DURATION_S,
             participation_error: 0.0,
+            measurement: [0.0; 4],
+            event_offset_s: 0.0,
             delay_s: spec.uncertainty.actuation_delay_s,
             seed: 0,
             initial: std::array::from_fn(|d| 0.5 * (initial.lower[d] + initial.upper[d])),
@@ -87,6 +93,9 @@ impl Scenario {
         let share = self.participation_error;
         within("--participation-error", share, 0.0, 1.0, "0 to 1")?;
         within("--delay-s", self.delay_s, 0.0, 60.0, "0 to 60 s")?;
+        for value in self.measurement {
+            within("--measurement-error", value, 0.0, 10.0, "0 to 10 each")?;
+        }
         for value in self.initial {
             within(
                 "uncertainty.initial",

@@ -117,7 +117,7 @@ pub(crate) fn visits(table: &TableView<'_>, cell: Cell) -> (u16, bool) {
     for law in Law::ALL {
         let entry = table.header().laws[law as usize];
         if let (Some(view), Some(entry)) = (table.law(law), entry) {
-            let visits = view.encoding().visits(cell);
+            let visits = view.visits(cell);
             worst = worst.max(visits);
             exceeded |= visits > entry.worst_visits;
         }

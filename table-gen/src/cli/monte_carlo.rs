@@ -1,0 +1,150 @@
+//! `simulate SPEC --runs N`: many runs, and what they have in common.
+
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::time::{Duration, Instant};
+
+use firmware::table::TableView;
+use indicatif::{ProgressBar, ProgressDrawTarget};
+use serde::Serialize;
+
+use super::simulate::{Chances, SimulateArgs};
+use super::{Failure, output, progress, simulate};
+use crate::simulation::closed_loop::ClosedLoop;
+use crate::simulation::monte_carlo::draws::Draws;
+use crate::simulation::monte_carlo::statistics::{Quantiles, Share};
+use crate::simulation::monte_carlo::{self, RUNS_MAX, Statistics};
+use crate::spec::Spec;
+
+/// Runs between two looks at the clock and at Ctrl-C.
+const BATCH: usize = 1000;
+
+#[derive(Debug, Serialize)]
+struct MonteCarloReport<'r> {
+    spec: &'r str,
+    draws: &'r Draws,
+    #[serde(flatten)]
+    statistics: &'r Statistics,
+}
+
+/// The bands of a spec, as the options change them.
+pub(super) fn draws(
+    spec: &Spec,
+    chances: &Chances,
+    duration_s: Option<f64>,
+) -> Result<Draws, Failure> {
+    let mut draws = Draws::of(spec);
+    draws.duration_s = duration_s.unwrap_or(draws.duration_s);
+    draws.participation_error = chances
+        .participation_error
+        .unwrap_or(draws.participation_error);
+    if let Some(band) = chances.loss_gw {
+        draws.loss_gw = band.0;
+    }
+    if let Some(band) = chances.delay_s {
+        draws.delay_s = band.0;
+    }
+    if let Some(bounds) = chances.measurement_error {
+        draws.measurement_error = bounds.0;
+    }
+    draws.check().map_err(Failure::bad)?;
+    Ok(draws)
+}
+
+/// Runs the loop many times with a progress bar.
+pub(super) fn many(
+    closed_loop: &ClosedLoop<'_>,
+    draws: &Draws,
+    runs: usize,
+    seed: u64,
+) -> Result<Statistics, Failure> {
+    if !(1..=RUNS_MAX).contains(&runs) {
+        return Err(Failure::BadInput(format!(
+            "--runs = {runs} is out of range: 1 to {RUNS_MAX}"
+        )));
+    }
+    let (start, count) = (Instant::now(), AtomicUsize::new(0));
+    let bar = ProgressBar::with_draw_target(Some(runs as u64), ProgressDrawTarget::hidden());
+    let done = || {
+        let done = count.fetch_add(1, Ordering::Relaxed) + 1;
+        if done % BATCH == 0 {
+            if start.elapsed() > Duration::from_secs(1) {
+                bar.set_draw_target(ProgressDrawTarget::stderr());
+            }
+            bar.set_position(done as u64);
+            return !progress::interrupted();
+        }
+        true
+    };
+    let statistics = monte_carlo::run(closed_loop, draws, runs, seed, &done);
+    bar.finish_and_clear();
+    statistics.ok_or_else(|| Failure::No("interrupted".to_owned()))
+}
+
+/// Runs the command: N runs, and their table or JSON.
+pub(super) fn run(
+    args: &SimulateArgs,
+    spec: &Spec,
+    table: &TableView<'_>,
+    runs: usize,
+) -> Result<(), Failure> {
+    let draws = draws(spec, &args.chances, args.duration_s)?;
+    let closed_loop = ClosedLoop::new(spec, table, args.estimator()).map_err(Failure::bad)?;
+    let start = Instant::now();
+    let statistics = many(&closed_loop, &draws, runs, args.seed)?;
+    let elapsed_s = start.elapsed().as_secs_f64();
+    if args.output.json {
+        return output::json(&MonteCarloReport {
+            spec: &spec.name,
+            draws: &draws,
+            statistics: &statistics,
+        });
+    }
+    print(&statistics);
+    output::line(format_args!(
+        "{} runs of {} s in {elapsed_s:.2} s; worst of all: --runs 1 --seed {}",
+        output::grouped(runs),
+        draws.duration_s,
+        statistics.worst.seed
+    ));
+    simulate::summary(&statistics.worst.summary);
+    Ok(())
+}
+
+fn print(statistics: &Statistics) {
+    let mut shares = output::table(&["runs that", "count", "share %", "95 % interval"]);
+    let rows: [(&str, &Share); 4] = [
+        ("satisfy psi", &statistics.psi),
+        ("fall below the containment", &statistics.breached),
+        ("stay in I2 once back", &statistics.stayed_in_inner),
+        ("fall back to the droop", &statistics.fallback),
+    ];
+    for (name, share) in rows {
+        shares.add_row(vec![
+            name.to_owned(),
+            output::grouped(share.count),
+            format!("{:.3}", 100.0 * share.share),
+            format!("{:.3} to {:.3}", 100.0 * share.low, 100.0 * share.high),
+        ]);
+    }
+    output::line(shares);
+    let header = [
+        "measure", "never", "min", "1 %", "5 %", "50 %", "95 %", "99 %", "max",
+    ];
+    let mut quantiles = output::table(&header);
+    let rows: [(&str, usize, &Quantiles); 3] = [
+        ("nadir Hz", 4, &statistics.nadir_hz),
+        ("back in I1 s", 2, &statistics.entered_outer_s),
+        ("back in I2 s", 2, &statistics.entered_inner_s),
+    ];
+    for (name, digits, measure) in rows {
+        let mut row = vec![name.to_owned(), output::grouped(measure.without)];
+        let values = measure
+            .at
+            .map(|at| [at.min, at.p01, at.p05, at.p50, at.p95, at.p99, at.max]);
+        for index in 0..7 {
+            row.push(values.map_or_else(|| "-".to_owned(), |v| format!("{:.digits$}", v[index])));
+        }
+        quantiles.add_row(row);
+    }
+    output::line(quantiles);
+}

@@ -1,0 +1,142 @@
+//! `report SPEC`: one HTML file, and its figures.
+
+use std::path::PathBuf;
+
+use serde::Serialize;
+use serde_json::Value;
+
+use super::files::write_all;
+use super::{Failure, OutputArgs, SpecArgs, output, progress};
+use crate::pipeline;
+use crate::report::study::Study;
+use crate::report::{self, Findings, ROBUSTNESS_RUNS};
+use crate::simulation::monitor::Summary;
+use crate::simulation::monte_carlo::{RUNS_MAX, Statistics};
+use crate::spec::Spec;
+
+/// Arguments of `report`.
+#[derive(Debug, clap::Args)]
+pub(super) struct ReportArgs {
+    #[command(flatten)]
+    spec: SpecArgs,
+    #[command(flatten)]
+    output: OutputArgs,
+    /// Folder for report.html and the figures as .svg and .csv; verdict.json and budget.json are taken from there
+    #[arg(long, value_name = "DIR", default_value = "out")]
+    out: PathBuf,
+    /// Table of the spec, instead of synthesising one
+    #[arg(long, value_name = "FILE")]
+    table: Option<PathBuf>,
+    /// Specs to show beside it, synthesised; default: the same with the other direction of charging, if it is shipped
+    #[arg(long, value_name = "SPEC")]
+    beside: Vec<String>,
+    /// Show no other spec
+    #[arg(long, conflicts_with = "beside")]
+    alone: bool,
+    /// Runs of the robustness section
+    #[arg(long, value_name = "N", default_value_t = ROBUSTNESS_RUNS)]
+    runs: usize,
+}
+
+#[derive(Debug, Serialize)]
+struct StudyReport<'r> {
+    spec: &'r str,
+    baseline: &'r Summary,
+    symbolic: &'r Summary,
+    uncertain: &'r Summary,
+    robustness: &'r Statistics,
+}
+
+#[derive(Debug, Serialize)]
+struct ReportReport<'r> {
+    studies: Vec<StudyReport<'r>>,
+    files: Vec<String>,
+}
+
+/// Runs the command.
+pub(super) fn run(args: &ReportArgs) -> Result<(), Failure> {
+    if !(1..=RUNS_MAX).contains(&args.runs) {
+        return Err(Failure::BadInput(format!(
+            "--runs = {} is out of range: 1 to {RUNS_MAX}",
+            args.runs
+        )));
+    }
+    let spec = args.spec.load()?;
+    let mut specs = vec![(spec.clone(), args.table.as_deref())];
+    for name in companions(args, &spec) {
+        specs.push((args.spec.overrides.load(&name)?, None));
+    }
+    let findings = Findings {
+        verdict: finding(args, "verdict.json")?,
+        budget: finding(args, "budget.json")?,
+    };
+    progress::catch_interrupts();
+    let mut studies = Vec::new();
+    for (spec, table) in &specs {
+        let bytes = pipeline::table_bytes(spec, *table, &progress::watch)?;
+        studies.push(Study::new(spec, &bytes, args.runs).map_err(Failure::bad)?);
+    }
+    let rendered = report::render_studies(&studies, &findings, Vec::new()).map_err(Failure::bad)?;
+    let files = rendered.files();
+    let named: Vec<(&str, &[u8])> = files
+        .iter()
+        .map(|(name, bytes)| (name.as_str(), bytes.as_bytes()))
+        .collect();
+    write_all(&args.out, &named)?;
+    let names: Vec<String> = files.iter().map(|(name, _)| name.clone()).collect();
+    if args.output.json {
+        let studies = studies
+            .iter()
+            .map(|study| StudyReport {
+                spec: &study.spec.name,
+                baseline: &study.baseline.summary,
+                symbolic: &study.symbolic.summary,
+                uncertain: &study.uncertain.summary,
+                robustness: &study.robustness,
+            })
+            .collect();
+        return output::json(&ReportReport {
+            studies,
+            files: names,
+        });
+    }
+    output::line(format_args!(
+        "wrote {} and {} figures into {}",
+        names.first().map_or("", String::as_str),
+        rendered.figures.len(),
+        args.out.display()
+    ));
+    Ok(())
+}
+
+/// Specs shown beside: what was asked for, else the shipped one with the other direction.
+fn companions(args: &ReportArgs, spec: &Spec) -> Vec<String> {
+    if args.alone || !args.beside.is_empty() {
+        return args.beside.clone();
+    }
+    let other = match spec.name.rsplit_once('-') {
+        Some((stem, "bi")) => format!("{stem}-uni"),
+        Some((stem, "uni")) => format!("{stem}-bi"),
+        _ => return Vec::new(),
+    };
+    // Only for a shipped spec: a file of its own has no twin.
+    let shipped = Spec::shipped_names();
+    let both = [args.spec.spec.as_str(), other.as_str()]
+        .iter()
+        .all(|name| shipped.contains(name));
+    if both { vec![other] } else { Vec::new() }
+}
+
+/// A JSON file of the folder, if it is there.
+fn finding(args: &ReportArgs, name: &str) -> Result<Option<Value>, Failure> {
+    let path = args.out.join(name);
+    let bad =
+        |error: &dyn std::fmt::Display| Failure::BadInput(format!("{}: {error}", path.display()));
+    match std::fs::read(&path) {
+        Ok(bytes) => serde_json::from_slice(&bytes)
+            .map(Some)
+            .map_err(|e| bad(&e)),
+        Err(error) if error.kind() == std::io::ErrorKind::NotFound => Ok(None),
+        Err(error) => Err(bad(&error)),
+    }
+}
