@@ -6,6 +6,10 @@ pub(super) const SHIPPED: &[(&str, &str)] = &[
     ("paper-uni", include_str!("../../specs/paper-uni.toml")),
     ("gb-bi", include_str!("../../specs/gb-bi.toml")),
     ("gb-uni", include_str!("../../specs/gb-uni.toml")),
+    (
+        "gb-bi-normal",
+        include_str!("../../specs/gb-bi-normal.toml"),
+    ),
 ];
 
 /// Names of the shipped specs, in the order of [`SHIPPED`].

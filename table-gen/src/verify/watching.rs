@@ -10,6 +10,7 @@ use firmware::phase::{PhaseState, Step};
 use firmware::table::TableView;
 use firmware::units::State;
 
+use super::cellset::CellSet;
 use super::event;
 use super::model::Model;
 use super::path::{PathStep, Traces};
@@ -35,6 +36,8 @@ const TIGHT_CELLS_MAX: u64 = 4096;
 pub(super) struct Watched {
     /// The cells of the first decision, each with the trace that leads there.
     pub(super) seeds: BTreeMap<u32, u32>,
+    /// The same cells as bits: most cells are met many times.
+    seen: CellSet,
     pub(super) traces: Traces,
     /// Last tick, from the first after the event, at which the first decision may come; `None` if there is no last.
     pub(super) last_tick: Option<u32>,
@@ -52,6 +55,7 @@ impl Watching<'_> {
     pub(super) fn watch(&self, tally: &mut Tally) -> Watched {
         let mut out = Watched {
             seeds: BTreeMap::new(),
+            seen: CellSet::new(&self.table.header().grid),
             traces: Traces::default(),
             last_tick: Some(0),
         };
@@ -139,7 +143,7 @@ impl Watching<'_> {
             Some(cells) if count(&cells) > TIGHT_CELLS_MAX => {
                 each(&cells, |cell| {
                     let index = grid.index(cell);
-                    if index.is_some_and(|index| out.seeds.contains_key(&index)) {
+                    if index.is_some_and(|index| out.seen.contains(index)) {
                         return;
                     }
                     let Some(bounds) = grid.bounds(cell) else {
@@ -188,7 +192,7 @@ impl Watching<'_> {
         let cell = grid.quantise(measured);
         let index = cell.and_then(|cell| grid.index(cell));
         let (next, step) = PhaseState::INITIAL.step(self.table, measured);
-        let known = index.is_some_and(|index| out.seeds.contains_key(&index));
+        let known = index.is_some_and(|index| out.seen.contains(index));
         if next == PhaseState::INITIAL || (known && step != Step::Outside) {
             return;
         }
@@ -202,6 +206,7 @@ impl Watching<'_> {
         let trace = out.traces.push(Some(parent), at);
         match (index, step) {
             (Some(index), Step::Level(_)) => {
+                out.seen.insert(index);
                 out.seeds.insert(index, trace);
             }
             _ => {
