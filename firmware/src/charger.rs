@@ -133,6 +133,18 @@ impl<'t, S: FrequencySource, D: Dispatch, W: Watchdog> Charger<'t, S, D, W> {
         cause: ResetCause,
     ) -> Self {
         let table = TableView::parse(table);
+        Self::with_table(source, dispatch, watchdog, table, config, cause)
+    }
+
+    /// The same for a table that was parsed already, as where many chargers share one.
+    pub fn with_table(
+        source: S,
+        dispatch: D,
+        watchdog: W,
+        table: Result<TableView<'t>, TableError>,
+        config: ChargerConfig,
+        cause: ResetCause,
+    ) -> Self {
         let (tick_ms, droop, plant) = match &table {
             Ok(view) => {
                 let header = view.header();

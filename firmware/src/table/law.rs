@@ -117,7 +117,7 @@ impl<'t> LawView<'t> {
         domain.saturating_add(self.encoding().worst_visits())
     }
 
-    /// Leaves or half-spaces of the domain part.
+    /// Leaves and half-spaces of the domain part.
     pub fn domain_entries(&self) -> u32 {
         self.domain.entries()
     }

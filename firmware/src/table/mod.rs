@@ -18,7 +18,9 @@ mod write;
 
 pub use affine::{AFFINE_LEN, AffineFunction, LEVEL_FRACTION_BITS};
 pub use dense::{DENSE_HEADER_LEN, DenseView, bits_per_entry};
-pub use domain::DomainKind;
+pub use domain::{
+    DomainKind, HALF_SPACES_MAX, LEAF_HALF_SPACE, LEAF_HULL, LEAF_INSIDE, LEAF_OUTSIDE,
+};
 pub use header::{
     BYTE_ORDER_MARK, CRC_LEN, DIRECTORY_ENTRY_LEN, FORMAT_VERSION, HEADER_LEN, Header, LAWS,
     LEVELS_MAX, Law, LawEntry, MAGIC, PlantParameters, SPEC_HASH_LEN,

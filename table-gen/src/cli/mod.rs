@@ -4,7 +4,9 @@
 
 mod band;
 mod build;
+mod counterfactual;
 mod files;
+mod fleet;
 mod monitor;
 mod monte_carlo;
 mod output;
@@ -38,6 +40,10 @@ enum Command {
     Synth(synth::SynthArgs),
     /// Run the grid with no response, the baseline droop or the firmware on a table
     Simulate(simulate::SimulateArgs),
+    /// A recorded event with the fleet responding: what the frequency would have been
+    Counterfactual(counterfactual::CounterfactualArgs),
+    /// Run every charger with its own firmware, meter, clock and faults
+    Fleet(fleet::FleetArgs),
     /// One HTML page with the figures of the paper and more, and each figure as .svg and .csv
     Report(report::ReportArgs),
     /// Run the firmware on a recorded frequency
@@ -114,6 +120,7 @@ impl From<crate::pipeline::PipelineError> for Failure {
     fn from(error: crate::pipeline::PipelineError) -> Self {
         match error {
             crate::pipeline::PipelineError::Synthesis(error) => error.into(),
+            crate::pipeline::PipelineError::Compress(error) => Self::No(error.to_string()),
             other => Self::bad(other),
         }
     }
@@ -150,6 +157,8 @@ pub fn run() -> ExitCode {
         Command::Build(args) => build::run(&args),
         Command::Synth(args) => synth::run(&args),
         Command::Simulate(args) => simulate::run(&args),
+        Command::Counterfactual(args) => counterfactual::run(&args),
+        Command::Fleet(args) => fleet::run(&args),
         Command::Report(args) => report::run(&args),
         Command::Replay(args) => replay::run(&args),
         Command::Verify(args) => verify::run(&args),

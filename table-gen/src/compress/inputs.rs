@@ -5,6 +5,7 @@
 //! allowed, among them nearly always the simple one. A tree that picks any allowed input in every cell lowers the rank in
 //! every step, so it wins; ranked by its own choices, the game can only gain freedom or lose useless one.
 
+use firmware::grid::Cell;
 use firmware::table::AffineFunction;
 
 use super::CompressError;
@@ -72,19 +73,13 @@ impl InputsTask<'_> {
         if self.rounds == 0 {
             return Ok(best);
         }
-        let narrow = |cell: [u32; STATES]| cell.map(|i| i as u16);
-        // The first law wins what it can alone, the others help where it cannot go on.
-        let first = |_: usize, cell| match laws.laws.first() {
-            Some(law) => 1u32 << law.level(firmware::grid::Cell(narrow(cell)), levels),
-            None => 0,
-        };
-        let mut solution = self.reach(target, &first, true)?;
+        let mut solution = self.ranked_by(&laws, target)?;
         let laws = choose_laws(self.candidates, levels, &self.cells(&solution));
         for _ in 0..self.rounds {
             let next = self.attempt(&laws, &solution, 0)?;
-            let choice = |_: usize, cell| {
-                let cell = narrow(cell);
-                let leaf = next.tree.leaf(firmware::grid::Cell(cell));
+            let choice = |_: usize, cell: [u32; STATES]| {
+                let cell = cell.map(|i| i as u16);
+                let leaf = next.tree.leaf(Cell(cell));
                 1u32 << next.laws.level(leaf, cell)
             };
             let again = self.reach(target, &choice, false)?;
@@ -98,6 +93,15 @@ impl InputsTask<'_> {
             solution = again;
         }
         Ok(best)
+    }
+
+    /// The game ranked by the first of some laws: it wins what it can alone, all inputs help where it cannot go on.
+    pub(super) fn ranked_by(&self, laws: &LawSet, target: &BitSet) -> Result<Solution, GameError> {
+        let first = |_: usize, cell: [u32; STATES]| match laws.laws.first() {
+            Some(law) => 1u32 << law.level(Cell(cell.map(|i| i as u16)), laws.levels),
+            None => 0,
+        };
+        self.reach(target, &first, true)
     }
 
     fn reach(
@@ -117,7 +121,7 @@ impl InputsTask<'_> {
     }
 
     /// Cells of the domain with their allowed inputs.
-    fn cells(&self, solution: &Solution) -> Vec<([u16; STATES], u32)> {
+    pub(super) fn cells(&self, solution: &Solution) -> Vec<([u16; STATES], u32)> {
         let shape = self.abstraction.shape();
         self.domain
             .iter()
@@ -126,7 +130,7 @@ impl InputsTask<'_> {
             .collect()
     }
 
-    fn worst_rank(&self, solution: &Solution) -> u16 {
+    pub(super) fn worst_rank(&self, solution: &Solution) -> u16 {
         let ranks = self.domain.iter().map(|index| solution.ranks[index]);
         ranks.filter(|rank| *rank != NOT_WON).max().unwrap_or(0)
     }

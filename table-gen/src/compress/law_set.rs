@@ -69,8 +69,7 @@ impl LawSet {
 
     /// The set without the laws that a tree does not name, and the tree with its leaves renumbered.
     pub fn used(&self, tree: &Tree) -> (Self, Tree) {
-        let mut named = 0u64;
-        mark(tree, &mut named);
+        let named = tree.values();
         let mut renumbered = [0u8; 64];
         let mut laws = Vec::new();
         for value in 0..64u8 {
@@ -84,28 +83,7 @@ impl LawSet {
             };
         }
         let levels = self.levels;
-        (Self { laws, levels }, renumber(tree, &renumbered))
-    }
-}
-
-fn mark(tree: &Tree, named: &mut u64) {
-    match tree {
-        Tree::Leaf(value) => *named |= 1 << value,
-        Tree::Split { left, right, .. } => {
-            mark(left, named);
-            mark(right, named);
-        }
-    }
-}
-
-fn renumber(tree: &Tree, to: &[u8; 64]) -> Tree {
-    match tree {
-        Tree::Leaf(value) => Tree::Leaf(to[usize::from(*value)]),
-        Tree::Split { plane, left, right } => Tree::Split {
-            plane: *plane,
-            left: Box::new(renumber(left, to)),
-            right: Box::new(renumber(right, to)),
-        },
+        (Self { laws, levels }, tree.renumbered(&renumbered))
     }
 }
 

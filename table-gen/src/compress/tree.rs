@@ -48,6 +48,27 @@ impl Tree {
         }
     }
 
+    /// Leaf values that occur, as bits.
+    pub fn values(&self) -> u64 {
+        match self {
+            Self::Leaf(value) => 1 << value,
+            Self::Split { left, right, .. } => left.values() | right.values(),
+        }
+    }
+
+    /// The same tree with other leaf values.
+    #[must_use]
+    pub fn renumbered(&self, to: &[u8; 64]) -> Self {
+        match self {
+            Self::Leaf(value) => Self::Leaf(to[usize::from(*value)]),
+            Self::Split { plane, left, right } => Self::Split {
+                plane: *plane,
+                left: Box::new(left.renumbered(to)),
+                right: Box::new(right.renumbered(to)),
+            },
+        }
+    }
+
     /// Most nodes that a lookup visits; a tree that is one leaf counts as one.
     pub fn depth(&self) -> u16 {
         self.inner_depth().max(1)
@@ -112,7 +133,7 @@ pub(super) fn bounds(cells: &[LabelledCell]) -> ([u16; STATES], [u16; STATES]) {
 }
 
 /// Depth after which halving the widest axis has told all cells apart.
-fn depth_by_halving(cells: &[LabelledCell]) -> u32 {
+pub(super) fn depth_by_halving(cells: &[LabelledCell]) -> u32 {
     let (low, high) = bounds(cells);
     (0..STATES)
         .map(|d| u16::BITS - high[d].saturating_sub(low[d]).leading_zeros())
@@ -120,7 +141,10 @@ fn depth_by_halving(cells: &[LabelledCell]) -> u32 {
 }
 
 /// Parts the cells by a plane.
-fn cut(cells: &mut [LabelledCell], plane: Plane) -> (&mut [LabelledCell], &mut [LabelledCell]) {
+pub(super) fn cut(
+    cells: &mut [LabelledCell],
+    plane: Plane,
+) -> (&mut [LabelledCell], &mut [LabelledCell]) {
     let mut below = 0;
     for at in 0..cells.len() {
         if cells[at].cell[plane.axis] < plane.threshold {
