@@ -5,8 +5,10 @@
 mod band;
 mod build;
 mod counterfactual;
+mod falsify;
 mod files;
 mod fleet;
+mod formula;
 mod monitor;
 mod monte_carlo;
 mod output;
@@ -50,6 +52,10 @@ enum Command {
     Replay(replay::ReplayArgs),
     /// Check the bytes of a table against a spec, independently of how they were made
     Verify(verify::VerifyArgs),
+    /// Search for a real trajectory that breaks a table
+    Falsify(falsify::FalsifyArgs),
+    /// A requirement in temporal logic: as games of a spec, or as a monitor of a recorded frequency
+    Formula(formula::FormulaArgs),
     /// Show a charger's telemetry, live from a serial port or from a recording
     Monitor(monitor::MonitorArgs),
 }
@@ -162,6 +168,8 @@ pub fn run() -> ExitCode {
         Command::Report(args) => report::run(&args),
         Command::Replay(args) => replay::run(&args),
         Command::Verify(args) => verify::run(&args),
+        Command::Falsify(args) => falsify::run(&args),
+        Command::Formula(args) => formula::run(&args),
         Command::Monitor(args) => monitor::run(&args),
     };
     match result {
