@@ -12,6 +12,7 @@
 //! | [`synthesis`] | a spec | the laws C1, C2, Hold |
 //! | [`compress`] | the laws' freedom | small trees and domains |
 //! | [`emit`] | laws | the bytes of a table |
+//! | [`inspect`], [`budget`] | a table | what is in it, and what it takes of a microcontroller |
 //! | [`pipeline`] | a spec | a table, the whole way |
 //! | [`simulation`] | a table, or a baseline | the grid's frequency in time |
 //! | [`replay`] | a recorded frequency | what the firmware would have done |
@@ -22,12 +23,14 @@
 
 pub mod abstraction;
 pub mod boost_converter;
+pub mod budget;
 pub mod cli;
 pub mod compress;
 pub mod emit;
 pub mod flow;
 pub mod game;
 pub mod grid_shape;
+pub mod inspect;
 pub mod interval;
 pub mod pipeline;
 pub mod plant;

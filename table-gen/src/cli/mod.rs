@@ -3,8 +3,10 @@
 //! Exit codes: 0 done; 1 the answer is "no" (not verified, no controller exists, limit reached); 2 bad input.
 
 mod band;
+mod budget;
 mod build;
 mod files;
+mod inspect;
 mod monte_carlo;
 mod output;
 mod plot;
@@ -43,6 +45,10 @@ enum Command {
     Replay(replay::ReplayArgs),
     /// Check the bytes of a table against a spec, independently of how they were made
     Verify(verify::VerifyArgs),
+    /// Bytes by part, visits of a lookup, free flash on a list of microcontrollers
+    Budget(budget::BudgetArgs),
+    /// What is in a table: header, levels, jumps between neighbours, slices
+    Inspect(inspect::InspectArgs),
 }
 
 /// The spec and what overrides it.
@@ -150,6 +156,8 @@ pub fn run() -> ExitCode {
         Command::Report(args) => report::run(&args),
         Command::Replay(args) => replay::run(&args),
         Command::Verify(args) => verify::run(&args),
+        Command::Budget(args) => budget::run(&args),
+        Command::Inspect(args) => inspect::run(&args),
     };
     match result {
         Ok(()) => ExitCode::SUCCESS,
