@@ -111,7 +111,8 @@ pub struct Charger<'t, S, D, W> {
     observer: Option<(PlantParameters, ObserverConfig, Observer)>,
     control: ControlLoop<'t>,
     droop: Droop,
-    cause: ResetCause,
+    /// Restarted by a fault, and the warm-up that follows is not over.
+    restarted: bool,
     warm_up_ticks: u16,
     warm_up_left: u16,
     lost_ticks: u16,
@@ -181,7 +182,7 @@ impl<'t, S: FrequencySource, D: Dispatch, W: Watchdog> Charger<'t, S, D, W> {
             observer,
             control: ControlLoop::with_table(table),
             droop,
-            cause,
+            restarted: cause != ResetCause::PowerOn,
             warm_up_ticks,
             warm_up_left: warm_up_ticks,
             lost_ticks: 0,
@@ -209,6 +210,11 @@ impl<'t, S: FrequencySource, D: Dispatch, W: Watchdog> Charger<'t, S, D, W> {
     /// Why the table was rejected, if it was.
     pub fn table_error(&self) -> Option<TableError> {
         self.control.table_error()
+    }
+
+    /// The table, if it was accepted.
+    pub fn table(&self) -> Option<&TableView<'t>> {
+        self.control.table()
     }
 
     /// The source, to hand it captures.
@@ -242,8 +248,12 @@ impl<'t, S: FrequencySource, D: Dispatch, W: Watchdog> Charger<'t, S, D, W> {
         if self.control.table_error().is_some() {
             report.faults.insert(Faults::TABLE_REJECTED);
         }
-        if self.warm_up_left > 0 && self.cause != ResetCause::PowerOn {
-            report.faults.insert(Faults::RESTARTED);
+        if report.mode == Mode::WarmUp || self.warm_up_left > 0 {
+            if self.restarted {
+                report.faults.insert(Faults::RESTARTED);
+            }
+        } else {
+            self.restarted = false;
         }
         match self.dispatch.apply(report.participation, now_ms) {
             Ok(set_point) => {
@@ -259,7 +269,7 @@ impl<'t, S: FrequencySource, D: Dispatch, W: Watchdog> Charger<'t, S, D, W> {
 
     /// Ticks by which to advance; starts the observer again after a jump of the clock.
     fn ticks_due(&mut self, now_ms: u32, faults: &mut Faults) -> u16 {
-        let tick = u32::from(self.tick_ms);
+        let tick = u32::from(self.tick_ms).max(1);
         let Some(last_ms) = self.last_ms else {
             self.last_ms = Some(now_ms);
             return 1;

@@ -63,6 +63,11 @@ impl<'t> ControlLoop<'t> {
         self.table.as_ref().err().copied()
     }
 
+    /// The table, if it was accepted.
+    pub fn table(&self) -> Option<&TableView<'t>> {
+        self.table.as_ref().ok()
+    }
+
     /// Phase, level and clock as they stand.
     pub fn phase_state(&self) -> PhaseState {
         self.state

@@ -135,16 +135,24 @@ pub enum DecodeError {
 
 /// The frame's bytes on the line, delimiter included.
 pub fn encode<'b>(frame: &Frame, buffer: &'b mut [u8; FRAME_MAX]) -> &'b [u8] {
-    // The buffers hold every frame: neither call can fail, and an empty slice would send nothing.
-    let mut record = [0; RECORD_MAX];
-    let Ok(bytes) = postcard::to_slice(frame, &mut record) else {
+    // The buffers hold every frame: no call can fail, and an empty slice would send nothing.
+    let mut body = [0; RECORD_MAX + CRC_LEN];
+    let length = postcard::to_slice(frame, &mut body).map_or(0, |record| record.len());
+    let Some((record, rest)) = body.split_at_mut_checked(length) else {
         return &[];
     };
-    let crc = checksum(bytes).to_le_bytes();
-    match postcard::to_slice_cobs(&(frame, crc), buffer) {
-        Ok(bytes) => bytes,
-        Err(_) => &[],
+    let Some(crc) = rest.first_chunk_mut::<CRC_LEN>() else {
+        return &[];
+    };
+    *crc = checksum(record).to_le_bytes();
+    let body = body.get(..length + CRC_LEN).unwrap_or_default();
+    let Ok(written) = cobs::try_encode(body, buffer) else {
+        return &[];
+    };
+    if let Some(delimiter) = buffer.get_mut(written) {
+        *delimiter = 0;
     }
+    buffer.get(..=written).unwrap_or_default()
 }
 
 /// The frame of a stretch of bytes up to a delimiter (with or without it); the bytes are overwritten.

@@ -10,18 +10,23 @@
 //! | [`grid_shape`], [`abstraction`] | plant and grid | boxes of successor cells |
 //! | [`game`] | an abstraction and a target | allowed inputs and ranks |
 //! | [`synthesis`] | a spec | the laws C1, C2, Hold |
+//! | [`compress`] | the laws' freedom | small trees and domains |
 //! | [`emit`] | laws | the bytes of a table |
 //! | [`pipeline`] | a spec | a table, the whole way |
 //! | [`simulation`] | a table, or a baseline | the grid's frequency in time |
 //! | [`fleet`] | a table | the same with one firmware for each charger |
 //! | [`replay`] | a recorded frequency | what the firmware would have done |
+//! | [`monitor`] | a charger's telemetry | lines for a person |
+//! | [`boost_converter`] | nothing | a second plant: the engine knows none |
 //! | [`counterfactual`] | a recorded event | what it would have been with the chargers |
 //! | [`report`] | runs and findings | one HTML page and its figures |
 //! | [`cli`] | arguments | all of the above |
 #![forbid(unsafe_code)]
 
 pub mod abstraction;
+pub mod boost_converter;
 pub mod cli;
+pub mod compress;
 pub mod counterfactual;
 pub mod emit;
 pub mod fleet;
@@ -29,6 +34,7 @@ pub mod flow;
 pub mod game;
 pub mod grid_shape;
 pub mod interval;
+pub mod monitor;
 pub mod pipeline;
 pub mod plant;
 pub mod replay;

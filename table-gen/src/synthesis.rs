@@ -183,8 +183,25 @@ fn between_samples(spec: &Spec, grid: &Grid, (low, high): (f64, f64)) -> Optiona
     )))
 }
 
+/// The guard of C1 and C2: f stays above containment between the samples too, if the spec asks for it.
+pub fn containment_guard(spec: &Spec, grid: &Grid) -> OptionalGuard {
+    let low = spec.requirements.containment_hz.map(containment_micro);
+    between_samples(
+        spec,
+        grid,
+        (low.unwrap_or(f64::NEG_INFINITY), f64::INFINITY),
+    )
+}
+
+/// The guard of Hold: f stays in I2 between the samples too, if the spec asks for it.
+pub fn stay_guard(spec: &Spec, grid: &Grid) -> OptionalGuard {
+    let [low, high] = spec.requirements.inner_micro().map(f64::from);
+    between_samples(spec, grid, (low, high))
+}
+
 /// A guard, or none.
-struct OptionalGuard(Option<TubeGuard<STATES>>);
+#[derive(Debug, Clone)]
+pub struct OptionalGuard(Option<TubeGuard<STATES>>);
 
 impl Guard<STATES> for OptionalGuard {
     fn permitted(&self, cell: [u32; STATES], inputs: u32) -> u32 {
@@ -242,10 +259,9 @@ pub fn synthesise<'w>(
     let grid = device_grid(spec).map_err(SynthesisError::Grid)?;
     let before = usage::cpu_s();
     let abstraction = abstraction(spec, &grid)?;
-    let guard = |low: f64, high: f64| between_samples(spec, &grid, (low, high));
     let requirements = &spec.requirements;
     let containment = requirements.containment_hz.map(containment_micro);
-    let contained = guard(containment.unwrap_or(f64::NEG_INFINITY), f64::INFINITY);
+    let contained = containment_guard(spec, &grid);
     let abstraction_cpu_s = usage::cpu_s() - before;
     let error = measurement_micro(spec)[0];
     let [outer_low, outer_high] = requirements.outer_micro().map(f64::from);
@@ -258,7 +274,7 @@ pub fn synthesise<'w>(
         Some(limit) => by_frequency(&grid, |low, _| low - error < limit),
     };
     let hold = if requirements.stay {
-        let stay = guard(inner_low, inner_high);
+        let stay = stay_guard(spec, &grid);
         let law = solve("Hold", watch, |watch| {
             safety(&abstraction, &inner, &stay, watch)
         })?;

@@ -102,7 +102,7 @@ impl FrequencySource for ZeroCrossing {
         // One timer tick in a window of `cycles` nominal periods: 50 Hz * 50 / (cycles * timer_hz).
         let squared = u64::from(NOMINAL_HZ) * u64::from(NOMINAL_HZ) * MICRO as u64;
         let window = u64::from(self.cycles) * u64::from(self.timer_hz);
-        (squared / window + 1) as u32 + u32::from(self.clock_ppm) * NOMINAL_HZ
+        (squared / window.max(1) + 1) as u32 + u32::from(self.clock_ppm) * NOMINAL_HZ
     }
 
     fn lag_ms(&self) -> u16 {

@@ -2,8 +2,11 @@
 
 use super::BlockError;
 use super::dense::DenseView;
+use super::domain::DomainView;
 use super::header::{Header, LawEntry};
-use crate::grid::Cell;
+use super::tree::TreeView;
+use crate::grid::{Cell, Grid};
+use crate::units::STATES;
 
 /// What every encoding of a law's inputs can do.
 pub trait Encoding {
@@ -26,19 +29,21 @@ pub trait Encoding {
 pub enum InputsKind {
     /// Bit-packed array over a box of cells, 0 for "outside".
     Dense = 0,
+    /// k-d tree; needs a domain part.
+    Tree = 1,
 }
-
-/// Domain kind: the inputs part answers membership itself.
-pub(super) const DOMAIN_IN_INPUTS: u8 = 0;
 
 #[derive(Debug, Clone)]
 enum Inputs<'t> {
     Dense(DenseView<'t>),
+    Tree(TreeView<'t>),
 }
 
 /// Reader of one law.
 #[derive(Debug, Clone)]
 pub struct LawView<'t> {
+    count: [u16; STATES],
+    domain: DomainView<'t>,
     inputs: Inputs<'t>,
 }
 
@@ -50,22 +55,27 @@ impl<'t> LawView<'t> {
         inputs: &'t [u8],
         header: &Header,
     ) -> Result<Self, BlockError> {
-        if entry.domain_kind != DOMAIN_IN_INPUTS {
-            return Err(BlockError::UnknownEncoding {
-                found: entry.domain_kind,
-            });
-        }
-        if !domain.is_empty() {
-            return Err(BlockError::BadShape);
-        }
+        let grid: &Grid = &header.grid;
+        let domain = DomainView::parse(entry.domain_kind, domain, grid)?;
         let inputs = match entry.inputs_kind {
             kind if kind == InputsKind::Dense as u8 => {
-                Inputs::Dense(DenseView::parse(inputs, &header.grid, header.levels)?)
+                Inputs::Dense(DenseView::parse(inputs, grid, header.levels)?)
+            }
+            kind if kind == InputsKind::Tree as u8 => {
+                // The tree answers for every cell; only a domain part can say which are covered.
+                if matches!(domain, DomainView::InInputs) {
+                    return Err(BlockError::NoDomain);
+                }
+                Inputs::Tree(TreeView::parse(inputs, grid, header.levels)?)
             }
             found => return Err(BlockError::UnknownEncoding { found }),
         };
-        let view = Self { inputs };
-        if view.encoding().worst_visits() > entry.worst_visits {
+        let view = Self {
+            count: grid.count(),
+            domain,
+            inputs,
+        };
+        if view.worst_visits() > entry.worst_visits {
             return Err(BlockError::TooManyVisits);
         }
         Ok(view)
@@ -75,13 +85,40 @@ impl<'t> LawView<'t> {
     pub fn encoding(&self) -> &dyn Encoding {
         match &self.inputs {
             Inputs::Dense(view) => view,
+            Inputs::Tree(view) => view,
         }
     }
 
-    /// Input level at a cell; `None` outside the law's domain.
+    /// Input level at a cell; `None` outside the law's domain, and for a cell of another grid.
     pub fn lookup(&self, cell: Cell) -> Option<u8> {
+        let of_grid = cell.0.iter().zip(self.count).all(|(at, count)| *at < count);
+        if !of_grid || !self.domain.contains(cell).0 {
+            return None;
+        }
         match &self.inputs {
             Inputs::Dense(view) => view.level(cell),
+            Inputs::Tree(view) => view.level(cell),
         }
+    }
+
+    /// Half-spaces, nodes and entries that this lookup visits, both parts.
+    pub fn visits(&self, cell: Cell) -> u16 {
+        let (inside, visits) = self.domain.contains(cell);
+        if inside {
+            visits.saturating_add(self.encoding().visits(cell))
+        } else {
+            visits
+        }
+    }
+
+    /// The most that any lookup visits, both parts.
+    pub fn worst_visits(&self) -> u16 {
+        let domain = self.domain.worst_visits();
+        domain.saturating_add(self.encoding().worst_visits())
+    }
+
+    /// Leaves and half-spaces of the domain part.
+    pub fn domain_entries(&self) -> u32 {
+        self.domain.entries()
     }
 }

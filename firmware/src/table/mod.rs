@@ -6,18 +6,28 @@
 //! The image is checked once, by [`TableView::parse`]. After that every lookup is total: it ends within the bound of the
 //! law's directory entry, reads only inside its block and answers `None` for a cell that the law does not cover.
 
+mod affine;
 mod bytes;
 mod dense;
+mod domain;
 mod header;
 mod law;
+mod tree;
+mod tree_node;
 mod write;
 
+pub use affine::{AFFINE_LEN, AffineFunction, LEVEL_FRACTION_BITS};
 pub use dense::{DENSE_HEADER_LEN, DenseView, bits_per_entry};
+pub use domain::{
+    DomainKind, HALF_SPACES_MAX, LEAF_HALF_SPACE, LEAF_HULL, LEAF_INSIDE, LEAF_OUTSIDE,
+};
 pub use header::{
     BYTE_ORDER_MARK, CRC_LEN, DIRECTORY_ENTRY_LEN, FORMAT_VERSION, HEADER_LEN, Header, LAWS,
     LEVELS_MAX, Law, LawEntry, MAGIC, PlantParameters, SPEC_HASH_LEN,
 };
 pub use law::{Encoding, InputsKind, LawView};
+pub use tree::{AFFINE_LAWS_MAX, LEAF_AFFINE, TREE_DEPTH_MAX, TreeView};
+pub use tree_node::{Children, LEAF_VALUES, NODE_LEN_MAX, Node, SKIP_MAX};
 pub use write::{WriteError, seal, write_header};
 
 use crate::grid::{Cell, GridError};
@@ -110,7 +120,13 @@ pub enum BlockError {
     BadShape,
     /// An entry names an input level that does not exist.
     BadLevel,
-    /// A lookup could take more visits than the directory states.
+    /// A node of a tree is malformed, or a subtree does not end where its parent says.
+    BadNode,
+    /// A law or half-space could overflow 32 bits on the header's grid.
+    Overflow,
+    /// The inputs answer for every cell, so the law needs a domain part and has none.
+    NoDomain,
+    /// A lookup could take more visits than the directory states, or more than the reader accepts.
     TooManyVisits,
 }
 

@@ -7,6 +7,7 @@ mod build;
 mod counterfactual;
 mod files;
 mod fleet;
+mod monitor;
 mod monte_carlo;
 mod output;
 mod plot;
@@ -49,6 +50,8 @@ enum Command {
     Replay(replay::ReplayArgs),
     /// Check the bytes of a table against a spec, independently of how they were made
     Verify(verify::VerifyArgs),
+    /// Show a charger's telemetry, live from a serial port or from a recording
+    Monitor(monitor::MonitorArgs),
 }
 
 /// The spec and what overrides it.
@@ -117,6 +120,7 @@ impl From<crate::pipeline::PipelineError> for Failure {
     fn from(error: crate::pipeline::PipelineError) -> Self {
         match error {
             crate::pipeline::PipelineError::Synthesis(error) => error.into(),
+            crate::pipeline::PipelineError::Compress(error) => Self::No(error.to_string()),
             other => Self::bad(other),
         }
     }
@@ -158,6 +162,7 @@ pub fn run() -> ExitCode {
         Command::Report(args) => report::run(&args),
         Command::Replay(args) => replay::run(&args),
         Command::Verify(args) => verify::run(&args),
+        Command::Monitor(args) => monitor::run(&args),
     };
     match result {
         Ok(()) => ExitCode::SUCCESS,

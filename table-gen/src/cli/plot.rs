@@ -17,7 +17,7 @@ pub(super) fn frequency(points: &[(f64, f64)], levels_hz: &[f64]) -> String {
     };
     let (start, end) = extent(&|point| point.0);
     let (low, high) = extent(&|point| point.1);
-    if !(end > start) {
+    if end.partial_cmp(&start) != Some(std::cmp::Ordering::Greater) {
         return String::new();
     }
     let margin = 0.04 * (high - low).max(SPAN_MIN_HZ);

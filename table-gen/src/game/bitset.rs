@@ -76,6 +76,20 @@ impl BitSet {
         out
     }
 
+    /// Adds the cells of another set over the same universe.
+    pub fn add(&mut self, other: &Self) {
+        for (word, theirs) in self.words.iter_mut().zip(&other.words) {
+            *word |= theirs;
+        }
+    }
+
+    /// Keeps only cells that another set over the same universe has too.
+    pub fn keep(&mut self, other: &Self) {
+        for (word, theirs) in self.words.iter_mut().zip(&other.words) {
+            *word &= theirs;
+        }
+    }
+
     /// Whether the `len` cells from `index` on are all in the set.
     #[inline]
     pub fn all_ones(&self, index: usize, len: usize) -> bool {

@@ -22,6 +22,7 @@ pub mod blocks;
 pub mod guard;
 pub mod inclusion;
 pub mod reach;
+pub mod restricted;
 pub mod safety;
 
 use bitset::BitSet;

@@ -4,6 +4,8 @@
 pub(super) const SHIPPED: &[(&str, &str)] = &[
     ("paper-bi", include_str!("../../specs/paper-bi.toml")),
     ("paper-uni", include_str!("../../specs/paper-uni.toml")),
+    ("gb-bi", include_str!("../../specs/gb-bi.toml")),
+    ("gb-uni", include_str!("../../specs/gb-uni.toml")),
 ];
 
 /// Names of the shipped specs, in the order of [`SHIPPED`].

@@ -5,7 +5,7 @@ use super::model::Model;
 use super::tally::{Tally, Violation};
 use super::verdict::Claim;
 use crate::spec::Spec;
-use firmware::table::TableView;
+use firmware::table::{Law, TableView};
 
 /// What the claims are read off.
 pub(super) struct Findings<'a> {
@@ -35,6 +35,9 @@ impl Findings<'_> {
             ),
             self.settle(),
         ];
+        if self.table.law(Law::C2).is_some() {
+            claims.push(self.hand_over());
+        }
         if self.spec.requirements.stay {
             claims.push(self.stay());
         }
@@ -96,6 +99,22 @@ impl Findings<'_> {
             limit: None,
             unit: "periods",
             statement: format!("{what} within so many periods{}", self.scope),
+            reason,
+        }
+    }
+
+    fn hand_over(&self) -> Claim {
+        let reason = self.reason(&[Violation::Handover, Violation::Uncovered]);
+        Claim {
+            name: "hand-over",
+            holds: reason.is_none(),
+            bound: None,
+            limit: None,
+            unit: "",
+            statement: format!(
+                "C1 hands over where C2 has an entry: C1 never decides with f in I1{}",
+                self.scope
+            ),
             reason,
         }
     }

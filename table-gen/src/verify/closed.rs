@@ -19,7 +19,7 @@ use super::model::Model;
 use super::path::PathStep;
 use super::regions::Regions;
 use super::successor::successor;
-use super::tally::{Found, Tally, Violation, visits};
+use super::tally::{Found, Tally, Violation, missed_handover, visits};
 use crate::interval::Interval;
 use crate::plant::STATES;
 
@@ -90,9 +90,9 @@ impl Closed<'_> {
             // The order in which threads find cells must not show.
             next.sort_unstable();
             for (kind, cell, what) in failed {
-                tally.violations.entry(kind).or_insert_with(|| {
-                    let path = self.path(&layers, cell, seed_path);
-                    Found { what, path }
+                tally.violations.entry(kind).or_insert_with(|| Found {
+                    what,
+                    path: self.path(&layers, cell, seed_path),
                 });
             }
             layers.push(next);
@@ -173,6 +173,10 @@ impl Closed<'_> {
                 batch.violations.push((Violation::Uncovered, index, what));
                 continue;
             };
+            if missed_handover(self.table, next.phase, state) {
+                let what = "C1 decides in I1: C2 has no entry where C1 hands over".to_owned();
+                batch.violations.push((Violation::Handover, index, what));
+            }
             self.bound(index, &real, next.phase, drive, batch);
             match successor(grid, self.model, &real, drive) {
                 Some(cells) => {

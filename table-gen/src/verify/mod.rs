@@ -177,7 +177,12 @@ fn for_ever(
     go_on: &dyn Fn(f64) -> bool,
 ) -> Option<(Tally, u64)> {
     let mut tally = Tally::default();
-    let watched = watching::watch(job.table, job.model, job.regions, &mut tally);
+    let watching = watching::Watching {
+        table: job.table,
+        model: job.model,
+        regions: job.regions,
+    };
+    let watched = watching.watch(&mut tally);
     counts.sets = watched.traces.len() as u64;
     counts.first_cells = watched.seeds.len() as u64;
     let seeds: Vec<u32> = watched.seeds.keys().copied().collect();
@@ -188,9 +193,12 @@ fn for_ever(
     let cells = job.run(seeds, &seed_path, &mut tally, go_on)?;
     // From the last tick inside I1 to the first decision, then the periods.
     tally.settle_ticks = 1 + tally.periods * job.model.period_ticks;
-    if tally.limit.is_none() && !tally.violations.contains_key(&Violation::Late) {
+    if let Some(last) = watched.last_tick
+        && tally.limit.is_none()
+        && !tally.violations.contains_key(&Violation::Late)
+    {
         // The first tick comes up to a tick after the event.
-        let ticks = watched.last_tick + tally.settle_ticks;
+        let ticks = last + tally.settle_ticks;
         counts.event_to_inner_s = Some(f64::from(ticks) * job.model.tick_s);
     }
     Some((tally, cells))
@@ -209,6 +217,7 @@ fn counterexample(
             Violation::Containment => "containment",
             Violation::Late => "settle",
             Violation::Left => "stay",
+            Violation::Handover => "hand-over",
             Violation::Uncovered | Violation::Visits => "table",
         };
         let real = witness::find(replay, model, *kind, ticks);

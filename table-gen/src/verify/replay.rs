@@ -8,8 +8,9 @@ use firmware::table::TableView;
 use firmware::units::{AXIS_F, State};
 
 use super::model::Model;
-use super::tally::Violation;
+use super::tally::{Violation, missed_handover};
 use crate::flow::Flow;
+use crate::interval::Interval;
 use crate::plant::STATES;
 
 /// Pieces of a tick at which the frequency between ticks is looked at.
@@ -120,6 +121,11 @@ impl<'a> Replay<'a> {
             if step == Step::Outside {
                 return breach(Violation::Uncovered, x[AXIS_F]);
             }
+            if missed_handover(self.table, state.phase, State(measured))
+                && state.ticks_left + 1 == self.table.header().period_ticks
+            {
+                return breach(Violation::Handover, x[AXIS_F]);
+            }
             match state.phase {
                 Phase::C1 | Phase::C2 => {
                     let since = *since.get_or_insert(tick.saturating_sub(1));
@@ -163,9 +169,8 @@ impl<'a> Replay<'a> {
 
 fn plain(flow: &Flow<STATES>) -> ([[f64; STATES]; STATES], [f64; STATES]) {
     (
-        flow.phi
-            .map(|row| row.map(super::super::interval::Interval::mid)),
-        flow.gamma.map(super::super::interval::Interval::mid),
+        flow.phi.map(|row| row.map(Interval::mid)),
+        flow.gamma.map(Interval::mid),
     )
 }
 

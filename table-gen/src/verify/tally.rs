@@ -3,7 +3,9 @@
 use std::collections::BTreeMap;
 
 use firmware::grid::Cell;
+use firmware::phase::Phase;
 use firmware::table::{Law, TableView};
+use firmware::units::State;
 
 use super::model::Model;
 use super::path::{PathStep, Traces};
@@ -20,6 +22,8 @@ pub(super) enum Violation {
     Left,
     /// A reachable state has no entry.
     Uncovered,
+    /// C1 may have to decide where C2 should.
+    Handover,
     /// A lookup visits more than the header states.
     Visits,
 }
@@ -100,6 +104,11 @@ impl Tally {
             self.violate(Violation::Visits, what, trace, traces);
         }
     }
+}
+
+/// Whether C1 decided although f is in I1 and the table has a law for that: C2 does not cover where C1 hands over.
+pub(super) fn missed_handover(table: &TableView<'_>, phase: Phase, measured: State) -> bool {
+    phase == Phase::C1 && table.law(Law::C2).is_some() && table.header().outer.contains(measured)
 }
 
 /// Most visits of a lookup of any law at a cell, and whether they exceed the header's bound.

@@ -15,7 +15,7 @@ use super::event;
 use super::model::Model;
 use super::path::{PathStep, Traces};
 use super::regions::{Part, Regions};
-use super::tally::{Tally, Violation};
+use super::tally::{Tally, Violation, missed_handover};
 use super::zonotope::Zonotope;
 
 /// Most parts of a layer before they are merged.
@@ -226,6 +226,11 @@ impl<'a> Timed<'a> {
         {
             self.cells.insert((one.next.phase, index));
             self.tally.looked_up(self.table, cell, trace, &self.traces);
+        }
+        if missed_handover(self.table, one.next.phase, one.part.representative) {
+            let what = "C1 decides in I1: C2 has no entry where C1 hands over";
+            self.tally
+                .violate(Violation::Handover, what, trace, &self.traces);
         }
         let age = self.aged(tick, &one, trace);
         let (state, ticks) = run_out(self.table, one.next, one.part.representative);

@@ -36,7 +36,7 @@ pub struct Verdict {
 /// One claim.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Claim {
-    /// Short name: `header`, `containment`, `reach-outer`, `reach-inner`, `settle`, `stay`, `table`.
+    /// Short name: `header`, `containment`, `reach-outer`, `reach-inner`, `hand-over`, `settle`, `stay`, `table`.
     pub name: &'static str,
     /// Whether it is proven.
     pub holds: bool,

@@ -26,16 +26,24 @@ pub(super) fn find(
     if model.is_exact() {
         let count = u64::from(MOMENTS).min(tries.max(1));
         return (0..count).find_map(|n| {
-            let make = || Constant {
-                corner: [0.5; STATES],
-                moment: n as f64 / count as f64,
-                share: 0.0,
-                error: 0.0,
+            let make = || -> Box<dyn Adversary> {
+                Box::new(Constant {
+                    corner: [0.5; STATES],
+                    moment: n as f64 / count as f64,
+                    share: 0.0,
+                    error: 0.0,
+                })
             };
-            attempt(replay, model, kind, ticks, &make, || "none".to_owned())
+            attempt(replay, kind, ticks, &make, "none")
         });
     }
     (0..TRIES.min(tries.max(1))).find_map(|seed| {
+        let nominal = || Constant {
+            corner: [0.5; STATES],
+            moment: seed as f64 / TRIES as f64,
+            share: 0.0,
+            error: 0.0,
+        };
         let constant = || constant(seed);
         let bang = || BangBang {
             random: Random::new(seed),
@@ -43,19 +51,28 @@ pub(super) fn find(
             share: 1.0,
         };
         let resonant = || Resonant::new(seed);
-        attempt(replay, model, kind, ticks, &constant, || {
-            format!("constant extremes, number {seed}")
-        })
-        .or_else(|| {
-            attempt(replay, model, kind, ticks, &bang, || {
-                format!("random extremes, seed {seed}")
+        let run = |make: &dyn Fn() -> Box<dyn Adversary>, name: &str| {
+            attempt(replay, kind, ticks, make, name)
+        };
+        run(&|| Box::new(nominal()), "middle of every range")
+            .or_else(|| {
+                run(
+                    &|| Box::new(constant()),
+                    &format!("constant extremes, number {seed}"),
+                )
             })
-        })
-        .or_else(|| {
-            attempt(replay, model, kind, ticks, &resonant, || {
-                format!("resonant extremes, seed {seed}")
+            .or_else(|| {
+                run(
+                    &|| Box::new(bang()),
+                    &format!("random extremes, seed {seed}"),
+                )
             })
-        })
+            .or_else(|| {
+                run(
+                    &|| Box::new(resonant()),
+                    &format!("resonant extremes, seed {seed}"),
+                )
+            })
     })
 }
 
@@ -71,24 +88,23 @@ fn constant(seed: u64) -> Constant {
 }
 
 /// Runs once to find a breach; once more to record it.
-fn attempt<A: Adversary>(
+fn attempt(
     replay: &Replay<'_>,
-    model: &Model,
     kind: Violation,
     ticks: u32,
-    make: &dyn Fn() -> A,
-    name: impl Fn() -> String,
+    make: &dyn Fn() -> Box<dyn Adversary>,
+    name: &str,
 ) -> Option<RealPath> {
-    let breach = replay.run(&mut make(), ticks, &mut |_| {})?;
+    let breach = replay.run(make().as_mut(), ticks, &mut |_| {})?;
     if breach.kind != kind {
         return None;
     }
     let mut samples = Vec::new();
-    replay.run(&mut make(), ticks, &mut |sample| samples.push(*sample));
-    Some(real_path(model, breach, &samples, name()))
+    replay.run(make().as_mut(), ticks, &mut |sample| samples.push(*sample));
+    Some(real_path(breach, &samples, name))
 }
 
-fn real_path(model: &Model, breach: Breach, samples: &[Sample], adversary: String) -> RealPath {
+fn real_path(breach: Breach, samples: &[Sample], adversary: &str) -> RealPath {
     let changed = |i: usize| {
         let (before, now) = (&samples[i.max(1) - 1], &samples[i]);
         i == 0 || i + 1 == samples.len() || (before.phase, before.level) != (now.phase, now.level)
@@ -108,6 +124,7 @@ fn real_path(model: &Model, breach: Breach, samples: &[Sample], adversary: Strin
         Violation::Late => "I2 is not reached in time".to_owned(),
         Violation::Left => format!("f leaves I2 at {f:.4} Hz under Hold"),
         Violation::Uncovered => format!("no law has an entry at f = {f:.4} Hz"),
+        Violation::Handover => format!("C1 decides in I1, at f = {f:.4} Hz"),
         Violation::Visits => "a lookup visits too much".to_owned(),
     };
     RealPath {
@@ -115,11 +132,7 @@ fn real_path(model: &Model, breach: Breach, samples: &[Sample], adversary: Strin
         breach_s: breach.time_s,
         first_tick_s: samples.get(1).map_or(0.0, |sample| sample.time_s),
         initial: samples.first().map_or([0.0; 4], |s| s.x.map(|v| v / 1e6)),
-        adversary: if model.is_exact() {
-            "none".to_owned()
-        } else {
-            adversary
-        },
+        adversary: adversary.to_owned(),
         points,
     }
 }

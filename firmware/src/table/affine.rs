@@ -1,0 +1,125 @@
+//! Integer affine functions of a cell: the laws that a leaf of the tree may name, and the half-spaces of a domain.
+//!
+//! | offset | bytes | field |
+//! |---:|---:|---|
+//! | 0 | 4 × 2 | factor of each cell index, f g l p (i16) |
+//! | 8 | 4 | constant (i32) |
+//!
+//! The value is `constant + Σ factor·index`. It is checked once that no cell of the grid takes any partial sum out of
+//! 32 bits; after that the arithmetic cannot overflow.
+
+use super::bytes::{i32_at, u16_at};
+use crate::grid::{Cell, Grid};
+use crate::units::STATES;
+
+/// Bytes of a function.
+pub const AFFINE_LEN: usize = 2 * STATES + 4;
+
+/// Fractional bits of a law's value: the level is the value shifted right by these, clamped to the levels.
+pub const LEVEL_FRACTION_BITS: u32 = 10;
+
+/// An integer affine function of a cell.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub struct AffineFunction {
+    /// Factor of each cell index.
+    pub factors: [i16; STATES],
+    /// Value at the first cell.
+    pub constant: i32,
+}
+
+impl AffineFunction {
+    /// Reads a function; the slice must hold [`AFFINE_LEN`] bytes (zeros are read past its end).
+    pub fn read(bytes: &[u8]) -> Self {
+        let mut factors = [0i16; STATES];
+        for (axis, factor) in factors.iter_mut().enumerate() {
+            *factor = u16_at(bytes, 2 * axis).cast_signed();
+        }
+        Self {
+            factors,
+            constant: i32_at(bytes, 2 * STATES),
+        }
+    }
+
+    /// The function's bytes.
+    pub fn write(&self) -> [u8; AFFINE_LEN] {
+        let mut out = [0u8; AFFINE_LEN];
+        for (axis, factor) in self.factors.iter().enumerate() {
+            out[2 * axis..2 * axis + 2].copy_from_slice(&factor.to_le_bytes());
+        }
+        out[2 * STATES..].copy_from_slice(&self.constant.to_le_bytes());
+        out
+    }
+
+    /// Whether every partial sum over the grid's cells fits 32 bits.
+    pub fn fits(&self, grid: &Grid) -> bool {
+        let mut largest = i64::from(self.constant).abs();
+        for (factor, count) in self.factors.iter().zip(grid.count()) {
+            largest += i64::from(*factor).abs() * i64::from(count - 1);
+        }
+        largest <= i64::from(i32::MAX)
+    }
+
+    /// Value at a cell; wraps for a cell of another grid.
+    pub fn value(&self, cell: Cell) -> i32 {
+        let mut sum = self.constant;
+        for (factor, index) in self.factors.iter().zip(cell.0) {
+            sum = sum.wrapping_add(i32::from(*factor).wrapping_mul(i32::from(index)));
+        }
+        sum
+    }
+
+    /// The value as an input level: without its fraction, clamped to `0..levels`.
+    pub fn level(&self, cell: Cell, levels: u8) -> u8 {
+        let whole = self.value(cell) >> LEVEL_FRACTION_BITS;
+        whole.clamp(0, i32::from(levels.saturating_sub(1))) as u8
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    #[test]
+    fn golden_bytes_both_ways() {
+        let function = AffineFunction {
+            factors: [1, -2, 0x0304, i16::MIN],
+            constant: -5,
+        };
+        let bytes = [
+            0x01, 0x00, 0xFE, 0xFF, 0x04, 0x03, 0x00, 0x80, 0xFB, 0xFF, 0xFF, 0xFF,
+        ];
+        assert_eq!(function.write(), bytes);
+        assert_eq!(AffineFunction::read(&bytes), function);
+    }
+
+    #[test]
+    fn level_is_the_floor_clamped() {
+        let function = AffineFunction {
+            factors: [512, 0, 0, 0],
+            constant: -1024,
+        };
+        // Value in levels: i/2 - 1.
+        let level = |i| function.level(Cell([i, 9, 9, 9]), 3);
+        assert_eq!(
+            [0, 1, 2, 3, 4, 5, 6, 7].map(level),
+            [0, 0, 0, 0, 1, 1, 2, 2]
+        );
+    }
+
+    proptest! {
+        #[test]
+        fn a_function_that_fits_never_overflows(
+            factors in any::<[i16; 4]>(), constant in any::<i32>(), at in any::<[u16; 4]>(),
+        ) {
+            let count = [300u16, 40, 7, 1];
+            let grid = Grid::new([0; 4], [1; 4], count).unwrap();
+            let cell = Cell(core::array::from_fn(|d| at[d] % count[d]));
+            let function = AffineFunction { factors, constant };
+            let exact = (0..4).fold(i64::from(constant), |sum, d| sum + i64::from(factors[d]) * i64::from(cell.0[d]));
+            if function.fits(&grid) {
+                prop_assert_eq!(i64::from(function.value(cell)), exact);
+            }
+        }
+    }
+}

@@ -1,0 +1,199 @@
+//! An uncertain event: whole cells, from the trigger on.
+//!
+//! Before the trigger (No control) there is no game. The states in which f can first be seen below I1 are enclosed in
+//! boxes, one for each short piece of time: the flow of the initial box under the loss band, cut at the largest fall of f
+//! within a tick. From there every decision takes a cell to the abstraction's box of cells.
+
+use firmware::grid::Cell;
+use firmware::table::{LAWS, Law, TableView};
+
+use super::super::CompressError;
+use crate::abstraction::Abstraction;
+use crate::abstraction::affine::AffineAbstraction;
+use crate::flow::{Flow, absolute_integral};
+use crate::game::bitset::BitSet;
+use crate::interval::Interval;
+use crate::plant::{GridPlant, STATES};
+use crate::spec::Spec;
+use crate::synthesis::{MICRO, measurement_micro, net_power};
+
+/// Pieces into which a tick is cut.
+const PIECES: u32 = 8;
+/// Longest time to the trigger that is looked at \[s\]: past it the initial box must have left I1 or stays.
+const TRIGGER_S_MAX: f64 = 60.0;
+
+/// Explores; the table must hold every law with its whole domain.
+///
+/// # Errors
+/// A loop that reaches a cell without an entry.
+pub fn explore(
+    spec: &Spec,
+    abstraction: &AffineAbstraction<STATES>,
+    table: &TableView<'_>,
+) -> Result<[BitSet; LAWS], CompressError> {
+    let shape = abstraction.shape();
+    let header = table.header();
+    let mut asked: [BitSet; LAWS] = std::array::from_fn(|_| BitSet::new(shape.cells()));
+    let mut seen = BitSet::new(shape.cells());
+    let mut open: Vec<usize> = Vec::new();
+    for (low, high) in trigger_boxes(spec) {
+        each_cell(spec, abstraction, low, high, |index| {
+            if !seen.contains(index) {
+                seen.insert(index);
+                open.push(index);
+            }
+        })?;
+    }
+    while let Some(index) = open.pop() {
+        let at = shape.cell(index);
+        let cell = Cell(at.map(|i| i as u16));
+        let (low, high) = shape.interval(0, at[0]);
+        // The firmware's order: Hold, then C2 if the measured f is in I1, then C1.
+        let mut laws = Vec::new();
+        let hold = table.lookup(Law::Hold, cell);
+        let c2 = table.lookup(Law::C2, cell);
+        match (hold, c2) {
+            (Some(_), _) => laws.push(Law::Hold),
+            (None, None) => laws.push(Law::C1),
+            (None, Some(_)) => {
+                let (outer_low, outer_high) = (
+                    f64::from(header.outer.low_uhz),
+                    f64::from(header.outer.high_uhz),
+                );
+                if high > outer_low && low <= outer_high {
+                    laws.push(Law::C2);
+                }
+                if low < outer_low || high > outer_high + 1.0 {
+                    laws.push(Law::C1);
+                }
+            }
+        }
+        let anchor = abstraction.anchor(at);
+        for law in laws {
+            let outside = || CompressError::LeavesTable {
+                state: [low as i32, 0, 0, 0],
+            };
+            let level = table.lookup(law, cell).ok_or_else(outside)?;
+            asked[law as usize].insert(index);
+            let next = abstraction
+                .successor(&anchor, level.into())
+                .ok_or_else(outside)?;
+            each_in(next.low, next.high, |cell| {
+                let index = shape.index(cell);
+                if !seen.contains(index) {
+                    seen.insert(index);
+                    open.push(index);
+                }
+            });
+        }
+    }
+    Ok(asked)
+}
+
+/// Boxes \[micro-units\] that hold every state in which a tick first finds f below I1.
+fn trigger_boxes(spec: &Spec) -> Vec<([f64; STATES], [f64; STATES])> {
+    let (a, b) = GridPlant::new(spec).matrices();
+    let tick_s = f64::from(spec.sampling.watch_ms()) / 1000.0;
+    let piece_s = tick_s / f64::from(PIECES);
+    let step = Flow::over(&a, &b, piece_s);
+    let error = measurement_micro(spec);
+    let below = f64::from(spec.requirements.outer_micro()[0]) + error[0];
+    let drive = net_power(spec, 0);
+    let middle = Interval::point(drive.mid());
+    let varying = absolute_integral(&a, &b, piece_s).map(|x| x * drive.radius());
+    let initial = &spec.uncertainty.initial;
+    // The flow of the box is that of its centre plus its generators; a sum of magnitudes bounds them.
+    let mut centre: [Interval; STATES] = std::array::from_fn(|d| {
+        Interval::point(0.5 * (initial.lower[d] + initial.upper[d]) * MICRO)
+    });
+    let mut phi = Flow::<STATES>::identity().phi;
+    let radius: [f64; STATES] =
+        std::array::from_fn(|d| 0.5 * (initial.upper[d] - initial.lower[d]) * MICRO);
+    let mut varied = [0.0f64; STATES];
+    let mut ticks = 0.0;
+    let mut previous: Option<([f64; STATES], [f64; STATES])> = None;
+    let mut boxes = Vec::new();
+    while ticks * piece_s < TRIGGER_S_MAX {
+        let (mut low, mut high) = ([0.0; STATES], [0.0; STATES]);
+        for d in 0..STATES {
+            let reach: f64 = (0..STATES).map(|j| phi[d][j].magnitude() * radius[j]).sum();
+            let spread = reach + varied[d] + error[d];
+            low[d] = centre[d].low - spread;
+            high[d] = centre[d].high + spread;
+        }
+        // The hull of two ends of a piece holds the piece but for its bend, far below a cell.
+        if let Some((was_low, was_high)) = previous {
+            let first: [f64; STATES] = std::array::from_fn(|d| low[d].min(was_low[d]));
+            let last: [f64; STATES] = std::array::from_fn(|d| high[d].max(was_high[d]));
+            if first[0] < below {
+                // Seen at the first tick below: within a tick's fall of the limit.
+                let fall = (high[0] - low[0]).max(0.0) + tick_s * steepest(spec) * MICRO;
+                let mut clipped = first;
+                clipped[0] = first[0].max(below - 2.0 * error[0] - fall);
+                let mut end = last;
+                end[0] = last[0].min(below);
+                if clipped[0] <= end[0] {
+                    boxes.push((clipped, end));
+                }
+                if last[0] < below - 2.0 * error[0] - fall {
+                    break;
+                }
+            }
+        }
+        previous = Some((low, high));
+        let flowed = crate::flow::apply(&step.phi, &centre);
+        centre = std::array::from_fn(|d| flowed[d] + step.gamma[d] * middle);
+        phi = crate::flow::product(&step.phi, &phi);
+        for d in 0..STATES {
+            // The variation so far is carried on by |exp(A h)|, close to the identity.
+            varied[d] += varying[d];
+        }
+        ticks += 1.0;
+    }
+    boxes
+}
+
+/// Steepest fall of f from rest after the largest loss \[Hz/s\].
+fn steepest(spec: &Spec) -> f64 {
+    let loss = spec.uncertainty.loss_gw[1].abs();
+    let initial = &spec.uncertainty.initial;
+    let slack = initial.lower[3].abs() + spec.plant.damping_gw_per_hz * initial.upper[0].abs();
+    (loss + slack) / (2.0 * spec.plant.inertia_gw_s_per_hz)
+}
+
+/// Calls for every cell that a box \[micro-units\] meets.
+fn each_cell(
+    _spec: &Spec,
+    abstraction: &AffineAbstraction<STATES>,
+    low: [f64; STATES],
+    high: [f64; STATES],
+    mut call: impl FnMut(usize),
+) -> Result<(), CompressError> {
+    let shape = abstraction.shape();
+    let (mut first, mut last) = ([0u32; STATES], [0u32; STATES]);
+    for d in 0..STATES {
+        let index = |x: f64| ((x - shape.lower[d]) / shape.width[d]).floor();
+        let (from, to) = (index(low[d]), index(high[d]));
+        if from < 0.0 || to >= f64::from(shape.count[d]) {
+            return Err(CompressError::LeavesTable {
+                state: low.map(|x| x as i32),
+            });
+        }
+        (first[d], last[d]) = (from as u32, to as u32);
+    }
+    each_in(first, last, |cell| call(shape.index(cell)));
+    Ok(())
+}
+
+/// Calls for every cell of a box, both ends included.
+fn each_in(low: [u32; STATES], high: [u32; STATES], mut call: impl FnMut([u32; STATES])) {
+    for p in low[3]..=high[3] {
+        for l in low[2]..=high[2] {
+            for g in low[1]..=high[1] {
+                for f in low[0]..=high[0] {
+                    call([f, g, l, p]);
+                }
+            }
+        }
+    }
+}
