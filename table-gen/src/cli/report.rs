@@ -88,7 +88,11 @@ pub(super) fn run(args: &ReportArgs) -> Result<(), Failure> {
         let bytes = pipeline::table_bytes(spec, *table, &progress::watch)?;
         studies.push(Study::new(spec, &bytes, args.runs).map_err(Failure::bad)?);
     }
-    let rendered = report::render_studies(&studies, &findings, Vec::new()).map_err(Failure::bad)?;
+    let more = match (&trace, studies.first()) {
+        (Some(trace), Some(study)) => recorded(study, trace)?,
+        _ => Vec::new(),
+    };
+    let rendered = report::render_studies(&studies, &findings, more).map_err(Failure::bad)?;
     let files = rendered.files();
     let named: Vec<(&str, &[u8])> = files
         .iter()
