@@ -2,14 +2,19 @@
 
 use std::path::PathBuf;
 
+use firmware::table::TableView;
 use serde::Serialize;
 use serde_json::Value;
 
 use super::files::write_all;
 use super::{Failure, OutputArgs, SpecArgs, output, progress};
+use crate::counterfactual::{self, Question};
 use crate::pipeline;
+use crate::replay::trace::{self, Trace};
+use crate::replay::{self};
+use crate::report::section::Section;
 use crate::report::study::Study;
-use crate::report::{self, Findings, ROBUSTNESS_RUNS};
+use crate::report::{self, Findings, ROBUSTNESS_RUNS, record};
 use crate::simulation::monitor::Summary;
 use crate::simulation::monte_carlo::{RUNS_MAX, Statistics};
 use crate::spec::Spec;
@@ -33,6 +38,9 @@ pub(super) struct ReportArgs {
     /// Show no other spec
     #[arg(long, conflicts_with = "beside")]
     alone: bool,
+    /// Recorded frequency to replay and to answer what chargers would have changed
+    #[arg(long, value_name = "TRACE.csv")]
+    trace: Option<PathBuf>,
     /// Runs of the robustness section
     #[arg(long, value_name = "N", default_value_t = ROBUSTNESS_RUNS)]
     runs: usize,
@@ -62,6 +70,10 @@ pub(super) fn run(args: &ReportArgs) -> Result<(), Failure> {
         )));
     }
     let spec = args.spec.load()?;
+    let trace = match &args.trace {
+        Some(path) => Some(trace::read(path, None).map_err(Failure::bad)?),
+        None => None,
+    };
     let mut specs = vec![(spec.clone(), args.table.as_deref())];
     for name in companions(args, &spec) {
         specs.push((args.spec.overrides.load(&name)?, None));
@@ -76,7 +88,11 @@ pub(super) fn run(args: &ReportArgs) -> Result<(), Failure> {
         let bytes = pipeline::table_bytes(spec, *table, &progress::watch)?;
         studies.push(Study::new(spec, &bytes, args.runs).map_err(Failure::bad)?);
     }
-    let rendered = report::render_studies(&studies, &findings, Vec::new()).map_err(Failure::bad)?;
+    let more = match (&trace, studies.first()) {
+        (Some(trace), Some(study)) => recorded(study, trace)?,
+        _ => Vec::new(),
+    };
+    let rendered = report::render_studies(&studies, &findings, more).map_err(Failure::bad)?;
     let files = rendered.files();
     let named: Vec<(&str, &[u8])> = files
         .iter()
@@ -107,6 +123,22 @@ pub(super) fn run(args: &ReportArgs) -> Result<(), Failure> {
         args.out.display()
     ));
     Ok(())
+}
+
+/// The sections of a recorded event.
+fn recorded(study: &Study, trace: &Trace) -> Result<Vec<Section>, Failure> {
+    let parsed = TableView::parse(&study.table);
+    let table = parsed.map_err(|error| Failure::BadInput(format!("{error:?}")))?;
+    let replay = replay::replay(&table, trace)
+        .map_err(|error| Failure::BadInput(format!("the observer cannot be made: {error:?}")))?;
+    let question = Question::PAPER;
+    let found = counterfactual::answer(&study.spec, &table, trace, &question);
+    let found = found.map_err(Failure::bad)?;
+    let name = study.spec.name.as_str();
+    Ok(vec![
+        record::replay(name, trace, &replay),
+        record::counterfactual(name, &found),
+    ])
 }
 
 /// Specs shown beside: what was asked for, else the shipped one with the other direction.

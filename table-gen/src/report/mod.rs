@@ -13,9 +13,11 @@
 
 pub mod chart;
 pub mod figure;
+pub mod limits;
 pub mod page;
 pub mod palette;
 pub mod proof;
+pub mod record;
 pub mod responses;
 pub mod section;
 pub mod study;
@@ -122,6 +124,9 @@ pub fn render_studies(
     sections.push(responses::robustness(studies));
     if let Some(first) = studies.first() {
         sections.push(responses::table_two(&first.spec));
+    }
+    for study in studies {
+        sections.push(limits::beyond(study)?);
     }
     sections.extend(more);
     sections.push(proof::verdict(findings.verdict.as_ref()));
