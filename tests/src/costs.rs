@@ -17,7 +17,7 @@ use std::time::Duration;
 
 use firmware::link::session::{Session, Wires};
 use firmware::link::{Request, Response};
-use firmware::table::{Law, TableView, checksum};
+use firmware::table::{Law, TableView};
 
 use crate::images::{self, BARE, Elf, HOLDFAST, ImageError, PIL};
 use crate::pil::qemu::{PilError, Target, instructions};

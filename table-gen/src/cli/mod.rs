@@ -3,10 +3,14 @@
 //! Exit codes: 0 done; 1 the answer is "no" (not verified, no controller exists, limit reached); 2 bad input.
 
 mod band;
+mod budget;
 mod build;
 mod counterfactual;
+mod falsify;
 mod files;
 mod fleet;
+mod formula;
+mod inspect;
 mod monitor;
 mod monte_carlo;
 mod output;
@@ -50,8 +54,16 @@ enum Command {
     Replay(replay::ReplayArgs),
     /// Check the bytes of a table against a spec, independently of how they were made
     Verify(verify::VerifyArgs),
+    /// Search for a real trajectory that breaks a table
+    Falsify(falsify::FalsifyArgs),
+    /// A requirement in temporal logic: as games of a spec, or as a monitor of a recorded frequency
+    Formula(formula::FormulaArgs),
     /// Show a charger's telemetry, live from a serial port or from a recording
     Monitor(monitor::MonitorArgs),
+    /// Bytes by part, visits of a lookup, free flash on a list of microcontrollers
+    Budget(budget::BudgetArgs),
+    /// What is in a table: header, levels, jumps between neighbours, slices
+    Inspect(inspect::InspectArgs),
 }
 
 /// The spec and what overrides it.
@@ -162,7 +174,11 @@ pub fn run() -> ExitCode {
         Command::Report(args) => report::run(&args),
         Command::Replay(args) => replay::run(&args),
         Command::Verify(args) => verify::run(&args),
+        Command::Falsify(args) => falsify::run(&args),
+        Command::Formula(args) => formula::run(&args),
         Command::Monitor(args) => monitor::run(&args),
+        Command::Budget(args) => budget::run(&args),
+        Command::Inspect(args) => inspect::run(&args),
     };
     match result {
         Ok(()) => ExitCode::SUCCESS,

@@ -36,6 +36,7 @@ use crate::abstraction::Abstraction;
 use crate::abstraction::affine::{AbstractionError, AffineAbstraction};
 use crate::emit::{self, EmitError, EncodedLaw};
 use crate::game::bitset::BitSet;
+use crate::game::inclusion::Inclusion;
 use crate::game::{GameError, NOT_WON, Watch};
 use crate::plant::STATES;
 use crate::spec::{self, Spec};
@@ -186,6 +187,22 @@ pub fn compress<'w>(
     Ok(CompressedLaws { laws: done })
 }
 
+/// The whole table of a synthesis, and how its laws came out.
+///
+/// # Errors
+/// As [`compress`], and numbers of the spec that the header cannot hold.
+pub fn table<'w>(
+    spec: &Spec,
+    synthesis: &Synthesis,
+    options: &Options,
+    watch: &dyn Fn(&'static str) -> Box<dyn Watch + 'w>,
+) -> Result<(Vec<u8>, CompressedLaws), CompressError> {
+    let laws = compress(spec, synthesis, options, watch)?;
+    let header = emit::header(spec, synthesis.grid)?;
+    let image = emit::assemble(header, &laws.encoded())?;
+    Ok((image, laws))
+}
+
 struct Context<'c, 'w> {
     spec: &'c Spec,
     grid: &'c Grid,
@@ -233,10 +250,17 @@ impl<'w> Context<'_, 'w> {
         drop(dense);
         let table = TableView::parse(&image).map_err(EmitError::Rejected)?;
         let asked = reachable::reachable(self.spec, self.abstraction, &table)?;
+        let closed = asked.closed.then(|| {
+            let mut union = asked.laws[0].clone();
+            union.add(&asked.laws[1]);
+            union.add(&asked.laws[2]);
+            Inclusion::new(shape, &union, self.abstraction.extents())
+        });
         let mut done = Vec::new();
         for (controller, solved, target) in controllers {
-            let asked = &asked[controller.law as usize];
-            let (inputs, part) = controller.narrow(self.abstraction, asked, INPUTS_DEPTH_MAX)?;
+            let asked = &asked.laws[controller.law as usize];
+            let (inputs, part) =
+                controller.narrow(self.abstraction, asked, closed.as_ref(), INPUTS_DEPTH_MAX)?;
             done.push(finish(controller.law, solved, target, asked, inputs, part));
         }
         Ok(CompressedLaws { laws: done })

@@ -126,6 +126,9 @@ pub struct Variant {
     pub levels: Vec<LevelAnswer>,
 }
 
+/// Points of a curve with its band: time, value, half-width.
+pub type Curve = Vec<(f64, f64, f64)>;
+
 /// The answers on one plant.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct PlantAnswer {
@@ -146,7 +149,7 @@ pub struct PlantAnswer {
     pub disturbance: Disturbance,
     /// Frequency and participation with each fleet, in the last variant \[s, Hz, 1\].
     #[serde(skip)]
-    pub curves: Vec<(f64, Vec<(f64, f64, f64)>)>,
+    pub curves: Vec<(f64, Curve)>,
 }
 
 /// The whole answer.

@@ -114,7 +114,7 @@ pub fn run(
     slots.iter_mut().flatten().for_each(Instance::event);
     let ticks = (scenario.duration_s / tick_s).ceil().max(1.0) as u32;
     let mut told = ControlLoop::with_table(Ok(table.clone()));
-    let mut given_of_slot = vec![0i64; PARTS];
+    let mut given_of_slot = [0i64; PARTS];
     let mut x = scenario.initial;
     let mut monitor = Monitor::new(spec);
     let mut meters = Meters::new(tick_s, config.instances, plant.fleet);
