@@ -223,7 +223,7 @@ pub fn run(table: &[u8]) -> Result<Figures, CostError> {
     figures.note(&format!(
         "table of {} bytes, CRC {:08x}",
         table.len(),
-        checksum(table)
+        firmware::table::checksum(table)
     ));
     let bare = Elf::read(&images::build(BARE, images::TARGET)?)?;
     let stack = painted_stack(&bare, table)?;
