@@ -1,4 +1,9 @@
 //! The table format: bytes written by hand, every way in which an image can be wrong, and total lookups.
+#![allow(
+    clippy::unwrap_used,
+    clippy::panic,
+    reason = "a test that cannot go on fails"
+)]
 
 use firmware::droop::Droop;
 use firmware::grid::{Cell, Grid};

@@ -1,4 +1,9 @@
 //! Compression of the paper's bidirectional case, asked back from the emitted bytes.
+#![allow(
+    clippy::unwrap_used,
+    clippy::panic,
+    reason = "a test that cannot go on fails"
+)]
 
 use firmware::grid::Cell;
 use firmware::table::{Law, TableView};
