@@ -1,4 +1,9 @@
 //! Compression of the paper's bidirectional case, asked back from the emitted bytes.
+#![allow(
+    clippy::unwrap_used,
+    clippy::panic,
+    reason = "a test that cannot go on fails"
+)]
 
 use firmware::grid::Cell;
 use firmware::table::{Law, TableView};
@@ -28,7 +33,7 @@ fn table(spec: &Spec, synthesis: &Synthesis, exact_domain: bool) -> (Vec<u8>, Co
     compress::table(spec, synthesis, &options, &unwatched).unwrap()
 }
 
-fn solved<'s>(synthesis: &'s Synthesis, law: Law) -> &'s synthesis::SolvedLaw {
+fn solved(synthesis: &Synthesis, law: Law) -> &synthesis::SolvedLaw {
     match law {
         Law::C1 => &synthesis.c1,
         Law::C2 => synthesis.c2.as_ref().unwrap(),

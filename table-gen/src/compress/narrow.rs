@@ -26,8 +26,8 @@ use crate::plant::STATES;
 
 /// Cells of a grid up to which membership looks at all of them; past that only at the box around the reachable ones.
 const CELLS_ALL_MAX: usize = 4_000_000;
-/// Most nodes on a path of a membership tree.
-const DEPTH_MAX: u32 = 24;
+/// Most nodes on a path of a membership tree, well above the bits of the four axes, below which boxes are only halved.
+const DEPTH_MAX: u32 = 40;
 
 /// A law with a fixed controller.
 #[derive(Debug)]
