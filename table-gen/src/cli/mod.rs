@@ -143,7 +143,7 @@ impl From<crate::synthesis::SynthesisError> for Failure {
         use crate::game::GameError;
         use crate::synthesis::SynthesisError as E;
         match &error {
-            E::Grid(_) | E::Abstraction(_) => Self::bad(error),
+            E::Delay { .. } | E::Grid(_) | E::Abstraction(_) => Self::bad(error),
             E::Game {
                 error: GameError::EmptyTarget,
                 ..

@@ -51,6 +51,9 @@ pub const INPUTS_DEPTH_MAX: u32 = 32;
 /// Rounds of ranking by the tree's own choices.
 pub const ROUNDS: u32 = 8;
 
+/// Times that a reachable table is explored again and narrowed.
+const NARROWINGS: u32 = 4;
+
 /// How to compress.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Options {
@@ -102,6 +105,12 @@ pub struct CompressedLaws {
 }
 
 impl CompressedLaws {
+    /// Bytes of all parts.
+    pub fn part_bytes(&self) -> usize {
+        let parts = self.laws.iter().map(|law| &law.encoded);
+        parts.map(|law| law.domain.len() + law.inputs.len()).sum()
+    }
+
     /// Cells in which a law's game ends; none for Hold and for a law that the table does not hold.
     pub fn target(&self, law: Law) -> Option<&BitSet> {
         let law = self.laws.iter().find(|found| found.law == law)?;
@@ -249,21 +258,52 @@ impl<'w> Context<'_, 'w> {
         let image = emit::assemble(emit::header(self.spec, *self.grid)?, &dense)?;
         drop(dense);
         let table = TableView::parse(&image).map_err(EmitError::Rejected)?;
-        let asked = reachable::reachable(self.spec, self.abstraction, &table)?;
+        let mut asked = reachable::reachable(self.spec, self.abstraction, &table)?;
+        let mut best = self.narrow(&controllers, &asked)?;
+        // The small controller, which keeps within the explored cells, may ask for fewer of them.
+        for _ in 0..NARROWINGS {
+            if !asked.closed {
+                break;
+            }
+            let image = emit::assemble(emit::header(self.spec, *self.grid)?, &best.encoded())?;
+            let table = TableView::parse(&image).map_err(EmitError::Rejected)?;
+            asked = reachable::reachable(self.spec, self.abstraction, &table)?;
+            let next = self.narrow(&controllers, &asked)?;
+            if next.part_bytes() >= best.part_bytes() {
+                break;
+            }
+            best = next;
+        }
+        Ok(best)
+    }
+
+    /// The laws for what is asked for.
+    fn narrow(
+        &self,
+        controllers: &[(Controller, &SolvedLaw, Option<BitSet>)],
+        asked: &reachable::Asked,
+    ) -> Result<CompressedLaws, CompressError> {
         let closed = asked.closed.then(|| {
             let mut union = asked.laws[0].clone();
             union.add(&asked.laws[1]);
             union.add(&asked.laws[2]);
-            Inclusion::new(shape, &union, self.abstraction.extents())
+            Inclusion::new(self.abstraction.shape(), &union, self.abstraction.extents())
         });
-        let mut done = Vec::new();
+        let mut laws = Vec::new();
         for (controller, solved, target) in controllers {
             let asked = &asked.laws[controller.law as usize];
             let (inputs, part) =
                 controller.narrow(self.abstraction, asked, closed.as_ref(), INPUTS_DEPTH_MAX)?;
-            done.push(finish(controller.law, solved, target, asked, inputs, part));
+            laws.push(finish(
+                controller.law,
+                solved,
+                target.clone(),
+                asked,
+                inputs,
+                part,
+            ));
         }
-        Ok(CompressedLaws { laws: done })
+        Ok(CompressedLaws { laws })
     }
 
     fn guard(&self, law: Law) -> OptionalGuard {
