@@ -6,6 +6,7 @@
 //! | [`section`], [`figure`] | the page as data |
 //! | [`responses`] | the event, the laws against the baseline, their robustness, Table II |
 //! | [`record`] | the recorded event: replay and counterfactual |
+//! | [`fleet`] | every charger with its own firmware |
 //! | [`limits`] | plants beyond the paper's, and what is outside the proof |
 //! | [`proof`] | verdict, budget, spec and hashes |
 //! | [`palette`], [`chart`] | the drawing |
@@ -13,6 +14,7 @@
 
 pub mod chart;
 pub mod figure;
+pub mod fleet;
 pub mod limits;
 pub mod page;
 pub mod palette;

@@ -6,7 +6,7 @@
 //!
 //! | module | holds |
 //! |---|---|
-//! | [`file`] | the scenario file |
+//! | [`mod@file`] | the scenario file |
 //! | [`plant`] | the equations |
 //! | [`grid`] | the same in time, for the firmware's loop |
 
