@@ -96,6 +96,12 @@ impl<'t> ControlLoop<'t> {
         }
     }
 
+    /// Lets the period's clock run on by ticks that nobody measured; a decision that fell due meanwhile is made at the next
+    /// [`ControlLoop::step`].
+    pub fn skip(&mut self, ticks: u16) {
+        self.state.ticks_left = self.state.ticks_left.saturating_sub(ticks);
+    }
+
     /// Forgets the event: back to No control.
     pub fn reset(&mut self) {
         self.state = PhaseState::INITIAL;

@@ -12,6 +12,7 @@
 //! | [`synthesis`] | a spec | the laws C1, C2, Hold |
 //! | [`compress`] | the laws' freedom | small trees and domains |
 //! | [`emit`] | laws | the bytes of a table |
+//! | [`inspect`], [`budget`] | a table | what is in it, and what it takes of a microcontroller |
 //! | [`pipeline`] | a spec | a table, the whole way |
 //! | [`verify`] | bytes and a spec | a verdict, independently of all before |
 //! | [`falsify`] | bytes and a spec | a real trajectory that breaks a claim, if a search finds one |
@@ -28,6 +29,7 @@
 
 pub mod abstraction;
 pub mod boost_converter;
+pub mod budget;
 pub mod cli;
 pub mod compress;
 pub mod counterfactual;
@@ -37,6 +39,7 @@ pub mod fleet;
 pub mod flow;
 pub mod game;
 pub mod grid_shape;
+pub mod inspect;
 pub mod interval;
 pub mod logic;
 pub mod monitor;

@@ -8,7 +8,7 @@ use serde::Serialize;
 
 use super::files::write_all;
 use super::synth::SynthReport;
-use super::{Failure, OutputArgs, SpecArgs, output, progress, simulate};
+use super::{Failure, OutputArgs, SpecArgs, output, progress, simulate, verify};
 use crate::compress::{LawReport, Options};
 use crate::pipeline::{self, Encoding};
 use crate::report::{self, Findings};
@@ -83,6 +83,10 @@ struct BuildReport<'r> {
     spec_hash: String,
     table_bytes: usize,
     encodings: Vec<EncodingReport>,
+    /// Whether every claim of the spec is proven from the bytes.
+    verified: bool,
+    /// Proven time from leaving I1 to I2 [s].
+    reach_within_s: Option<f64>,
     simulation: &'r Summary,
     phases: &'r [PhaseSpan],
 }
@@ -99,33 +103,53 @@ pub(super) fn run(args: &BuildArgs) -> Result<(), Failure> {
         TableView::parse(&bytes).map_err(|error| Failure::BadInput(format!("{error:?}")))?;
     let run = closed_loop::simulate(&spec, &table, &Scenario::of(&spec), Estimator::FullState)
         .map_err(Failure::bad)?;
+    let verdict = verify::examine(&bytes, &spec)?;
     let result = BuildReport {
         synth: &synth,
         spec_hash: hex(&spec.hash()),
         table_bytes: bytes.len(),
         encodings: encodings(&table, &emitted.laws),
+        verified: verdict.verified,
+        reach_within_s: verdict.claim("settle").and_then(|claim| claim.bound),
         simulation: &run.summary,
         phases: &run.phases,
     };
     let json = serde_json::to_string_pretty(&result).map_err(Failure::bad)?;
-    let findings = Findings::default();
+    let verdict_json = serde_json::to_string_pretty(&verdict).map_err(Failure::bad)?;
+    let findings = Findings {
+        verdict: Some(serde_json::to_value(&verdict).map_err(Failure::bad)?),
+        budget: None,
+    };
     let page = report::render(&spec, &bytes, &[], &findings, Vec::new()).map_err(Failure::bad)?;
+    // A table that is not proven must not be flashed by mistake for one that is.
+    let table_name = if verdict.verified {
+        "table.bin"
+    } else {
+        "table.unverified.bin"
+    };
     let files = [
-        ("table.bin", bytes.as_slice()),
+        (table_name, bytes.as_slice()),
+        ("verdict.json", verdict_json.as_bytes()),
         ("report.html", page.html.as_bytes()),
         ("build.json", json.as_bytes()),
     ];
     write_all(&args.out, &files)?;
     if args.output.json {
         output::line(json);
-        return Ok(());
+    } else {
+        synth.print();
+        print_encodings(&result);
+        verify::print(&verdict);
+        simulate::summary(&run.summary);
+        simulate::phases(&run.phases);
+        let names: Vec<&str> = files.iter().map(|(name, _)| *name).collect();
+        output::line(format_args!(
+            "wrote {} to {}",
+            names.join(", "),
+            args.out.display()
+        ));
     }
-    synth.print();
-    print_encodings(&result);
-    simulate::summary(&run.summary);
-    simulate::phases(&run.phases);
-    output::line(format_args!("wrote {}", args.out.display()));
-    Ok(())
+    verify::answer(&verdict)
 }
 
 fn encodings(table: &TableView<'_>, reports: &[(Law, LawReport)]) -> Vec<EncodingReport> {

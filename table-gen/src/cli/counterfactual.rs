@@ -6,7 +6,7 @@ use firmware::table::TableView;
 use serde::Serialize;
 
 use super::{Failure, OutputArgs, Overrides, output, plot, progress};
-use crate::counterfactual::{self, Counterfactual, LIMITS, Question, Variant};
+use crate::counterfactual::{self, Counterfactual, LIMITS, PlantAnswer, Question};
 use crate::pipeline;
 use crate::replay::trace;
 
@@ -37,8 +37,11 @@ pub(super) struct CounterfactualArgs {
     /// Demand that relays disconnected when the record passed 48.8 Hz [GW]; the paper says about 1 GW for 2019
     #[arg(long, value_name = "GW", default_value_t = 1.0)]
     relieved_gw: f64,
+    /// Response that the governors held on the day [GW], for the second plant
+    #[arg(long, value_name = "GW", default_value_t = 1.0)]
+    governor_max_gw: f64,
     /// Draws of the disturbance for the uncertainty
-    #[arg(long, value_name = "N", default_value_t = 200)]
+    #[arg(long, value_name = "N", default_value_t = 50)]
     draws: usize,
     /// Seed of the draws
     #[arg(long, value_name = "N", default_value_t = 0)]
@@ -60,47 +63,42 @@ struct CounterfactualReport<'r> {
     start: &'r str,
     recorded_nadir_hz: f64,
     relay_s: Option<f64>,
-    walk_gw: f64,
-    reading_hz: f64,
-    misfit_hz: f64,
-    largest_missing_gw: f64,
-    variants: &'r [Variant],
+    plants: &'r [PlantAnswer],
     limits: [&'static str; LIMITS.len()],
 }
 
-/// The question that the options ask.
-pub(super) fn question(
-    fleets_gw: &[f64],
-    relieved_gw: f64,
-    draws: usize,
-    seed: u64,
-) -> Result<Question, Failure> {
-    let within = |option: &str, value: f64, low: f64, high: f64| {
-        if value >= low && value <= high {
-            Ok(())
-        } else {
-            Err(Failure::BadInput(format!(
-                "{option} = {value} is out of range: {low} to {high}"
-            )))
+impl CounterfactualArgs {
+    /// The question that the options ask.
+    fn question(&self) -> Result<Question, Failure> {
+        let within = |option: &str, value: f64, low: f64, high: f64| {
+            if value >= low && value <= high {
+                Ok(())
+            } else {
+                Err(Failure::BadInput(format!(
+                    "{option} = {value} is out of range: {low} to {high}"
+                )))
+            }
+        };
+        for fleet_gw in &self.fleet_gw {
+            within("--fleet-gw", *fleet_gw, 0.0, 100.0)?;
         }
-    };
-    for fleet_gw in fleets_gw {
-        within("--fleet-gw", *fleet_gw, 0.0, 100.0)?;
+        within("--relieved-gw", self.relieved_gw, 0.0, 100.0)?;
+        within("--governor-max-gw", self.governor_max_gw, 0.0, 100.0)?;
+        within("--draws", self.draws as f64, 1.0, DRAWS_MAX as f64)?;
+        Ok(Question {
+            fleets_gw: self.fleet_gw.clone().into(),
+            relieved_gw: self.relieved_gw,
+            governor_max_gw: self.governor_max_gw,
+            draws: self.draws,
+            seed: self.seed,
+        })
     }
-    within("--relieved-gw", relieved_gw, 0.0, 100.0)?;
-    within("--draws", draws as f64, 1.0, DRAWS_MAX as f64)?;
-    Ok(Question {
-        fleets_gw: fleets_gw.to_vec(),
-        relieved_gw,
-        draws,
-        seed,
-    })
 }
 
 /// Runs the command.
 pub(super) fn run(args: &CounterfactualArgs) -> Result<(), Failure> {
     let spec = args.overrides.load(&args.spec)?;
-    let question = question(&args.fleet_gw, args.relieved_gw, args.draws, args.seed)?;
+    let question = args.question()?;
     super::replay::check_gaps(args.fill_gaps)?;
     let trace = trace::read(&args.trace, args.fill_gaps).map_err(Failure::bad)?;
     progress::catch_interrupts();
@@ -108,17 +106,12 @@ pub(super) fn run(args: &CounterfactualArgs) -> Result<(), Failure> {
     let table =
         TableView::parse(&bytes).map_err(|error| Failure::BadInput(format!("{error:?}")))?;
     let found = counterfactual::answer(&spec, &table, &trace, &question).map_err(Failure::bad)?;
-    let missing = found.disturbance.missing_gw.iter();
     let report = CounterfactualReport {
         spec: &spec.name,
         start: &trace.start,
         recorded_nadir_hz: found.recorded_nadir_hz,
         relay_s: found.relay_s,
-        walk_gw: found.fit.0,
-        reading_hz: found.fit.1,
-        misfit_hz: found.misfit_hz,
-        largest_missing_gw: missing.copied().fold(f64::NEG_INFINITY, f64::max),
-        variants: &found.variants,
+        plants: &found.plants,
         limits: LIMITS,
     };
     if args.output.json {
@@ -137,61 +130,63 @@ pub(super) fn run(args: &CounterfactualArgs) -> Result<(), Failure> {
     Ok(())
 }
 
+/// The largest fleet on the last plant.
 fn last_curve(found: &Counterfactual) -> Vec<(f64, f64)> {
-    let curve = found.curves.last().map(|(_, points)| points.as_slice());
-    curve
-        .unwrap_or(&[])
-        .iter()
-        .map(|(t, f, _)| (*t, *f))
-        .collect()
+    let curves = found.plants.last().map(|plant| plant.curves.as_slice());
+    let curve = curves.unwrap_or(&[]).last();
+    let points = curve.map_or(&[][..], |(_, points)| points);
+    points.iter().map(|(t, f, _)| (*t, *f)).collect()
 }
 
 fn print(report: &CounterfactualReport<'_>) {
     output::line(format_args!(
-        "record from {}: nadir {:.3} Hz; up to {:.2} GW missing; the plant follows the record within {:.1} mHz",
-        report.start,
-        report.recorded_nadir_hz,
-        report.largest_missing_gw,
-        1000.0 * report.misfit_hz
+        "record from {}: nadir {:.3} Hz",
+        report.start, report.recorded_nadir_hz
     ));
-    let header = [
-        "disturbance",
-        "fleet GW",
-        "chargers",
-        "nadir Hz",
-        "5 %",
-        "95 %",
-    ];
-    let mut table = output::table(&header);
-    for variant in report.variants {
-        for fleet in &variant.fleets {
-            let at = fleet.nadir_hz.at;
-            let text =
-                |value: Option<f64>| value.map_or_else(|| "-".to_owned(), |v| format!("{v:.3}"));
-            table.add_row(vec![
-                variant.name.to_owned(),
-                format!("{:.2}", fleet.fleet_gw),
-                output::grouped(fleet.chargers as usize),
-                format!("{:.3}", fleet.summary.nadir_hz),
-                text(at.map(|at| at.p05)),
-                text(at.map(|at| at.p95)),
-            ]);
+    let none = || "-".to_owned();
+    for plant in report.plants {
+        output::line(format_args!(
+            "\n{}: up to {:.2} GW missing; without chargers the plant follows the record within {:.1} mHz",
+            plant.name,
+            plant.largest_missing_gw,
+            1000.0 * plant.misfit_hz
+        ));
+        let header = [
+            "disturbance",
+            "fleet GW",
+            "chargers",
+            "nadir Hz",
+            "5 %",
+            "95 %",
+        ];
+        let mut fleets = output::table(&header);
+        let mut levels = output::table(&["disturbance", "above Hz", "fleet GW", "chargers"]);
+        for variant in &plant.variants {
+            for fleet in &variant.fleets {
+                let at = fleet.nadir_hz.at;
+                let text = |value: Option<f64>| value.map_or_else(none, |v| format!("{v:.3}"));
+                fleets.add_row(vec![
+                    variant.name.to_owned(),
+                    format!("{:.2}", fleet.fleet_gw),
+                    output::grouped(fleet.chargers as usize),
+                    format!("{:.3}", fleet.summary.nadir_hz),
+                    text(at.map(|at| at.p05)),
+                    text(at.map(|at| at.p95)),
+                ]);
+            }
+            for level in &variant.levels {
+                let much = || "more than 5".to_owned();
+                levels.add_row(vec![
+                    variant.name.to_owned(),
+                    format!("{:.1}", level.level_hz),
+                    level.fleet_gw.map_or_else(much, |gw| format!("{gw:.2}")),
+                    level
+                        .chargers
+                        .map_or_else(none, |n| output::grouped(n as usize)),
+                ]);
+            }
         }
+        output::line(fleets);
+        output::line(levels);
     }
-    output::line(table);
-    let mut table = output::table(&["disturbance", "above Hz", "fleet GW", "chargers"]);
-    for variant in report.variants {
-        for level in &variant.levels {
-            let none = || "more than 5 GW".to_owned();
-            table.add_row(vec![
-                variant.name.to_owned(),
-                format!("{:.1}", level.level_hz),
-                level.fleet_gw.map_or_else(none, |gw| format!("{gw:.2}")),
-                level
-                    .chargers
-                    .map_or_else(|| "-".to_owned(), |n| output::grouped(n as usize)),
-            ]);
-        }
-    }
-    output::line(table);
 }

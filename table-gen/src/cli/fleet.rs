@@ -31,7 +31,7 @@ pub(super) struct FleetArgs {
     #[arg(
         long,
         value_name = "S",
-        default_value_t = 120.0,
+        default_value_t = fleet::DURATION_S,
         allow_negative_numbers = true
     )]
     duration_s: f64,

@@ -3,12 +3,14 @@
 //! Exit codes: 0 done; 1 the answer is "no" (not verified, no controller exists, limit reached); 2 bad input.
 
 mod band;
+mod budget;
 mod build;
 mod counterfactual;
 mod falsify;
 mod files;
 mod fleet;
 mod formula;
+mod inspect;
 mod monitor;
 mod monte_carlo;
 mod output;
@@ -58,6 +60,10 @@ enum Command {
     Formula(formula::FormulaArgs),
     /// Show a charger's telemetry, live from a serial port or from a recording
     Monitor(monitor::MonitorArgs),
+    /// Bytes by part, visits of a lookup, free flash on a list of microcontrollers
+    Budget(budget::BudgetArgs),
+    /// What is in a table: header, levels, jumps between neighbours, slices
+    Inspect(inspect::InspectArgs),
 }
 
 /// The spec and what overrides it.
@@ -137,7 +143,7 @@ impl From<crate::synthesis::SynthesisError> for Failure {
         use crate::game::GameError;
         use crate::synthesis::SynthesisError as E;
         match &error {
-            E::Grid(_) | E::Abstraction(_) => Self::bad(error),
+            E::Delay { .. } | E::Grid(_) | E::Abstraction(_) => Self::bad(error),
             E::Game {
                 error: GameError::EmptyTarget,
                 ..
@@ -171,6 +177,8 @@ pub fn run() -> ExitCode {
         Command::Falsify(args) => falsify::run(&args),
         Command::Formula(args) => formula::run(&args),
         Command::Monitor(args) => monitor::run(&args),
+        Command::Budget(args) => budget::run(&args),
+        Command::Inspect(args) => inspect::run(&args),
     };
     match result {
         Ok(()) => ExitCode::SUCCESS,

@@ -23,8 +23,8 @@ const GIVE_UP_ONE_IN: usize = 100;
 const ROUNDS: u32 = 5;
 /// Positions of each half-space of the hull that a leaf may name.
 const TIGHTENINGS: u32 = 4;
-/// Most nodes on a path of a membership tree.
-const DEPTH_MAX: u32 = 20;
+/// Most nodes on a path of a membership tree: below the bits of the four axes boxes could only be halved.
+const DEPTH_MAX: u32 = 32;
 
 /// A law's game and where it is asked.
 pub struct Play<'p> {

@@ -36,6 +36,7 @@ use crate::abstraction::Abstraction;
 use crate::abstraction::affine::{AbstractionError, AffineAbstraction};
 use crate::emit::{self, EmitError, EncodedLaw};
 use crate::game::bitset::BitSet;
+use crate::game::inclusion::Inclusion;
 use crate::game::{GameError, NOT_WON, Watch};
 use crate::plant::STATES;
 use crate::spec::{self, Spec};
@@ -49,6 +50,9 @@ use narrow::Controller;
 pub const INPUTS_DEPTH_MAX: u32 = 32;
 /// Rounds of ranking by the tree's own choices.
 pub const ROUNDS: u32 = 8;
+
+/// Times that a reachable table is explored again and narrowed.
+const NARROWINGS: u32 = 4;
 
 /// How to compress.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -101,6 +105,12 @@ pub struct CompressedLaws {
 }
 
 impl CompressedLaws {
+    /// Bytes of all parts.
+    pub fn part_bytes(&self) -> usize {
+        let parts = self.laws.iter().map(|law| &law.encoded);
+        parts.map(|law| law.domain.len() + law.inputs.len()).sum()
+    }
+
     /// Cells in which a law's game ends; none for Hold and for a law that the table does not hold.
     pub fn target(&self, law: Law) -> Option<&BitSet> {
         let law = self.laws.iter().find(|found| found.law == law)?;
@@ -186,6 +196,22 @@ pub fn compress<'w>(
     Ok(CompressedLaws { laws: done })
 }
 
+/// The whole table of a synthesis, and how its laws came out.
+///
+/// # Errors
+/// As [`compress`], and numbers of the spec that the header cannot hold.
+pub fn table<'w>(
+    spec: &Spec,
+    synthesis: &Synthesis,
+    options: &Options,
+    watch: &dyn Fn(&'static str) -> Box<dyn Watch + 'w>,
+) -> Result<(Vec<u8>, CompressedLaws), CompressError> {
+    let laws = compress(spec, synthesis, options, watch)?;
+    let header = emit::header(spec, synthesis.grid)?;
+    let image = emit::assemble(header, &laws.encoded())?;
+    Ok((image, laws))
+}
+
 struct Context<'c, 'w> {
     spec: &'c Spec,
     grid: &'c Grid,
@@ -232,14 +258,52 @@ impl<'w> Context<'_, 'w> {
         let image = emit::assemble(emit::header(self.spec, *self.grid)?, &dense)?;
         drop(dense);
         let table = TableView::parse(&image).map_err(EmitError::Rejected)?;
-        let asked = reachable::reachable(self.spec, self.abstraction, &table)?;
-        let mut done = Vec::new();
-        for (controller, solved, target) in controllers {
-            let asked = &asked[controller.law as usize];
-            let (inputs, part) = controller.narrow(self.abstraction, asked, INPUTS_DEPTH_MAX)?;
-            done.push(finish(controller.law, solved, target, asked, inputs, part));
+        let mut asked = reachable::reachable(self.spec, self.abstraction, &table)?;
+        let mut best = self.narrow(&controllers, &asked)?;
+        // The small controller, which keeps within the explored cells, may ask for fewer of them.
+        for _ in 0..NARROWINGS {
+            if !asked.closed {
+                break;
+            }
+            let image = emit::assemble(emit::header(self.spec, *self.grid)?, &best.encoded())?;
+            let table = TableView::parse(&image).map_err(EmitError::Rejected)?;
+            asked = reachable::reachable(self.spec, self.abstraction, &table)?;
+            let next = self.narrow(&controllers, &asked)?;
+            if next.part_bytes() >= best.part_bytes() {
+                break;
+            }
+            best = next;
         }
-        Ok(CompressedLaws { laws: done })
+        Ok(best)
+    }
+
+    /// The laws for what is asked for.
+    fn narrow(
+        &self,
+        controllers: &[(Controller, &SolvedLaw, Option<BitSet>)],
+        asked: &reachable::Asked,
+    ) -> Result<CompressedLaws, CompressError> {
+        let closed = asked.closed.then(|| {
+            let mut union = asked.laws[0].clone();
+            union.add(&asked.laws[1]);
+            union.add(&asked.laws[2]);
+            Inclusion::new(self.abstraction.shape(), &union, self.abstraction.extents())
+        });
+        let mut laws = Vec::new();
+        for (controller, solved, target) in controllers {
+            let asked = &asked.laws[controller.law as usize];
+            let (inputs, part) =
+                controller.narrow(self.abstraction, asked, closed.as_ref(), INPUTS_DEPTH_MAX)?;
+            laws.push(finish(
+                controller.law,
+                solved,
+                target.clone(),
+                asked,
+                inputs,
+                part,
+            ));
+        }
+        Ok(CompressedLaws { laws })
     }
 
     fn guard(&self, law: Law) -> OptionalGuard {

@@ -2,7 +2,8 @@
 //!
 //! A simple controller is fixed first: the best affine law wherever the game, ranked by that law, allows it, else the
 //! nearest allowed level. The closed loop with it is explored; its cells must be covered and get the controller's very
-//! levels, so that the loop stays what was explored. All other cells are free, as long as no answer is wrong: a cell may
+//! levels, or, where whole cells were explored, any allowed level whose box stays among them: so the loop stays within
+//! what was explored. All other cells are free, as long as no answer is wrong: a cell may
 //! be covered if the answer there is one that the game allows. So both parts shrink to a few bytes.
 
 use firmware::grid::Cell;
@@ -19,12 +20,14 @@ use crate::abstraction::Abstraction;
 use crate::emit::{EncodedLaw, dense};
 use crate::game::Solution;
 use crate::game::bitset::BitSet;
+use crate::game::inclusion::Inclusion;
+use crate::game::reach::included;
 use crate::plant::STATES;
 
 /// Cells of a grid up to which membership looks at all of them; past that only at the box around the reachable ones.
 const CELLS_ALL_MAX: usize = 4_000_000;
-/// Most nodes on a path of a membership tree.
-const DEPTH_MAX: u32 = 24;
+/// Most nodes on a path of a membership tree, well above the bits of the four axes, below which boxes are only halved.
+const DEPTH_MAX: u32 = 40;
 
 /// A law with a fixed controller.
 #[derive(Debug)]
@@ -87,7 +90,7 @@ impl Controller {
         )
     }
 
-    /// Inputs and domain for the cells that are asked for.
+    /// Inputs and domain for the cells that are asked for; `closed` answers for the set in which boxes must stay.
     ///
     /// # Errors
     /// A tree that the format cannot hold.
@@ -95,6 +98,7 @@ impl Controller {
         &self,
         abstraction: &impl Abstraction<STATES>,
         asked: &BitSet,
+        closed: Option<&Inclusion<STATES>>,
         depth_max: u32,
     ) -> Result<(CompressedInputs, DomainPart), CompressError> {
         let shape = abstraction.shape();
@@ -103,10 +107,14 @@ impl Controller {
             .iter()
             .map(|index| {
                 let cell = narrow(index);
-                let level = self.level(cell, self.solution.masks[index]);
+                let allowed = self.solution.masks[index];
+                let kept = match closed {
+                    None => 1 << self.level(cell, allowed),
+                    Some(closed) => included(abstraction, closed, shape.cell(index), allowed),
+                };
                 LabelledCell {
                     cell,
-                    labels: self.laws.labels(cell, 1 << level),
+                    labels: self.laws.labels(cell, kept),
                 }
             })
             .collect();

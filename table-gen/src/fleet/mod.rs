@@ -32,6 +32,8 @@ const PARTS: usize = 10;
 /// Time for which the chargers watch the quiet grid before the event \[s\]: the observer's first guess, wrong by at most five
 /// times the meter's error, has decayed by exp(-10 s / T_2) at least.
 const QUIET_S: f64 = 10.0;
+/// Length of a run unless asked otherwise \[s\].
+pub const DURATION_S: f64 = 120.0;
 /// Most instances: their memory is below 1 KB each.
 pub const INSTANCES_MAX: usize = 5_000_000;
 
@@ -52,6 +54,21 @@ pub struct FleetConfig {
     pub spread_clocks: bool,
     /// Seed of everything that is drawn.
     pub seed: u64,
+}
+
+impl FleetConfig {
+    /// Meters within 1 mHz, nothing failed, clocks spread.
+    pub fn sound(instances: usize) -> Self {
+        Self {
+            instances,
+            noise_hz: 0.001,
+            failed_share: 0.0,
+            outages_per_hour: 0.0,
+            outage_s: 2.0,
+            spread_clocks: true,
+            seed: 0,
+        }
+    }
 }
 
 /// One tick of the fleet.
@@ -114,7 +131,7 @@ pub fn run(
     slots.iter_mut().flatten().for_each(Instance::event);
     let ticks = (scenario.duration_s / tick_s).ceil().max(1.0) as u32;
     let mut told = ControlLoop::with_table(Ok(table.clone()));
-    let mut given_of_slot = vec![0i64; PARTS];
+    let mut given_of_slot = [0i64; PARTS];
     let mut x = scenario.initial;
     let mut monitor = Monitor::new(spec);
     let mut meters = Meters::new(tick_s, config.instances, plant.fleet);

@@ -138,7 +138,7 @@ pub fn reach<const D: usize, A: Abstraction<D>>(
 
 /// Those of the inputs whose box from a cell is included.
 #[inline]
-pub(super) fn included<const D: usize, A: Abstraction<D>>(
+pub(crate) fn included<const D: usize, A: Abstraction<D>>(
     abstraction: &A,
     inclusion: &Inclusion<D>,
     cell: [u32; D],

@@ -149,6 +149,9 @@ fn processor_in_the_loop(
     let mut target = Target::start(&image, &table, false)?;
     let wires = Wires::default();
     let mut host = Session::new(&wires, &table);
+    if let Some(reason) = host.table_error() {
+        return Err(format!("the firmware's reader rejects the table: {reason:?}").into());
+    }
     let mut pair = Pair::new(&mut host, &mut target)?;
     for bidirectional in [false, true] {
         let outcome = closed_loop(&mut pair, &scenario::event(bidirectional))?;

@@ -22,7 +22,17 @@ use crate::game::bitset::BitSet;
 use crate::plant::STATES;
 use crate::spec::Spec;
 
-/// Cells for which the closed loop asks each law, in the order of the directory.
+/// What the closed loop asks for.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Asked {
+    /// Cells for which it asks each law, in the order of the directory.
+    pub laws: [BitSet; LAWS],
+    /// Whether the union of these cells is closed under the abstraction: then any allowed input whose box stays in it
+    /// will do, and not only the explored one.
+    pub closed: bool,
+}
+
+/// Cells for which the closed loop asks each law.
 ///
 /// # Errors
 /// A spec whose closed loop cannot be explored, or a loop that leaves the table.
@@ -30,12 +40,17 @@ pub fn reachable(
     spec: &Spec,
     abstraction: &AffineAbstraction<STATES>,
     table: &TableView<'_>,
-) -> Result<[BitSet; LAWS], CompressError> {
+) -> Result<Asked, CompressError> {
     if exactly_known(spec) {
-        return segments::explore(spec, table);
+        let laws = segments::explore(spec, table)?;
+        return Ok(Asked {
+            laws,
+            closed: false,
+        });
     }
     if spec.requirements.stay {
-        return whole_cells::explore(spec, abstraction, table);
+        let laws = whole_cells::explore(spec, abstraction, table)?;
+        return Ok(Asked { laws, closed: true });
     }
     Err(CompressError::Unbounded)
 }

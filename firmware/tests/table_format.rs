@@ -1,0 +1,525 @@
+//! The table format: bytes written by hand, every way in which an image can be wrong, and total lookups.
+#![allow(
+    clippy::unwrap_used,
+    clippy::expect_used,
+    clippy::panic,
+    reason = "a test that cannot go on fails"
+)]
+
+use firmware::droop::Droop;
+use firmware::grid::{Cell, Grid};
+use firmware::table::*;
+use firmware::units::Band;
+use proptest::prelude::*;
+
+/// A tree over 4 x 3 x 2 x 2 cells: f below 2 gives level 1; else g below 1 gives level 2, else the law.
+const TREE: [u8; 18] = [
+    0x01, // one affine law
+    0x00, 0x04, 0x00, 0x00, 0x00, 0x00, 0x00,
+    0x00, // f counts 1024 to the cell: one level a cell
+    0x00, 0xFC, 0xFF, 0xFF, // constant -1024: level f - 1
+    0x10, 0x01, // f, delta 2; left leaf 1, right node follows
+    0x0D, 0x42, 0x20, // g, delta 1; leaves 2 and law 0
+];
+/// Membership: p below 1 is inside if f + g >= 1, all else by the hull (g <= 1).
+const DOMAIN: [u8; 29] = [
+    0x02, 0x01, // two half-spaces, the first is the hull
+    0x00, 0x00, 0xFF, 0xFF, 0x00, 0x00, 0x00, 0x00, 0x01, 0x00, 0x00, 0x00, // 1 - g >= 0
+    0x01, 0x00, 0x01, 0x00, 0x00, 0x00, 0x00, 0x00, 0xFF, 0xFF, 0xFF, 0xFF, // f + g - 1 >= 0
+    0x0F, 0x43, 0x3F, // p, delta 1; leaves: half-space 1, hull
+];
+
+fn header() -> Header {
+    Header {
+        spec_hash: *b"0123456789abcdef",
+        grid: Grid::new([-4, -3, 0, 5], [2, 3, 4, 5], [4, 3, 2, 2]).unwrap(),
+        input_step_ppm: 50_000,
+        levels: 4,
+        stay: true,
+        tick_ms: 100,
+        period_ticks: 15,
+        outer: Band {
+            low_uhz: -300_000,
+            high_uhz: 0,
+        },
+        inner: Band {
+            low_uhz: -150_000,
+            high_uhz: 0,
+        },
+        droop: Droop {
+            deadband_uhz: 150_000,
+            full_uhz: 500_000,
+        },
+        plant: PlantParameters {
+            governor_gain_kw_per_hz: -5_000_000,
+            governor_time_us: 2_500_000,
+            turbine_time_us: 500_000,
+            lead_time_us: 2_000_000,
+            lag_time_us: 12_000_000,
+            damping_kw_per_hz: 1_000_000,
+            inertia_kw_s_per_hz: 4_000_000,
+            fleet_kw: 1_400_000,
+        },
+        laws: [None; LAWS],
+    }
+}
+
+/// An image with the tree as C1, and a dense law of one cell as Hold.
+fn image() -> Vec<u8> {
+    let mut header = header();
+    let dense: [u8; 17] = [
+        1, 0, 2, 0, 0, 0, 1, 0, // first cell
+        1, 0, 1, 0, 1, 0, 1, 0,    // one cell
+        0x04, // level 3
+    ];
+    header.laws[Law::C1 as usize] = Some(LawEntry {
+        domain_kind: DomainKind::Tree as u8,
+        inputs_kind: InputsKind::Tree as u8,
+        worst_visits: 4,
+        domain_len: DOMAIN.len() as u32,
+        inputs_len: TREE.len() as u32,
+    });
+    header.laws[Law::Hold as usize] = Some(LawEntry {
+        domain_kind: DomainKind::InInputs as u8,
+        inputs_kind: InputsKind::Dense as u8,
+        worst_visits: 1,
+        domain_len: 0,
+        inputs_len: dense.len() as u32,
+    });
+    let mut image = write_header(&header).to_vec();
+    image.extend(DOMAIN);
+    image.extend(TREE);
+    image.extend(dense);
+    image.extend([0; CRC_LEN]);
+    seal(&mut image).unwrap();
+    image
+}
+
+fn error(image: &[u8]) -> TableError {
+    TableView::parse(image).unwrap_err()
+}
+
+/// The image with some bytes replaced and sealed again, so that only the meaning is wrong.
+fn patched(at: usize, bytes: &[u8]) -> Vec<u8> {
+    let mut image = image();
+    image[at..at + bytes.len()].copy_from_slice(bytes);
+    seal(&mut image).unwrap();
+    image
+}
+
+#[test]
+fn header_bytes_are_as_documented() {
+    let image = image();
+    let golden: &[(usize, &[u8])] = &[
+        (0, b"HFDT"),
+        (4, &[0xFF, 0xFE]),
+        (6, &[1, 0]),
+        (8, &[240, 0, 0, 0]),
+        (12, b"0123456789abcdef"),
+        (28, &[0xFC, 0xFF, 0xFF, 0xFF, 0xFD, 0xFF, 0xFF, 0xFF]),
+        (36, &[0, 0, 0, 0, 5, 0, 0, 0]),
+        (44, &[2, 0, 0, 0, 3, 0, 0, 0, 4, 0, 0, 0, 5, 0, 0, 0]),
+        (60, &[4, 0, 3, 0, 2, 0, 2, 0]),
+        (68, &[0x50, 0xC3, 0, 0]),
+        (72, &[4, 1]),
+        (74, &[100, 0, 15, 0, 0, 0]),
+        // -300 000 is 0xFFFB6C20.
+        (80, &[0x20, 0x6C, 0xFB, 0xFF, 0, 0, 0, 0]),
+        (96, &[0xF0, 0x49, 0x02, 0, 0x20, 0xA1, 0x07, 0]),
+        // -5 000 000 is 0xFFB3B4C0.
+        (104, &[0xC0, 0xB4, 0xB3, 0xFF]),
+        (136, &[1, 1, 4, 0, 29, 0, 0, 0, 18, 0, 0, 0]),
+        (148, &[255, 255, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0]),
+        (160, &[0, 0, 1, 0, 0, 0, 0, 0, 17, 0, 0, 0]),
+        (172, &DOMAIN),
+        (201, &TREE),
+    ];
+    for (at, bytes) in golden {
+        assert_eq!(&image[*at..*at + bytes.len()], *bytes, "at {at}");
+    }
+    assert_eq!(image.len(), 240);
+    let table = TableView::parse(&image).unwrap();
+    let mut expected = header();
+    expected.laws = table.header().laws;
+    assert_eq!(*table.header(), expected);
+    assert_eq!(
+        write_header(table.header())[12..],
+        image[12..HEADER_LEN],
+        "what was read is written again"
+    );
+}
+
+#[test]
+fn tree_and_domain_answer_as_drawn() {
+    let image = image();
+    let table = TableView::parse(&image).unwrap();
+    let c1 = |f, g, l, p| table.lookup(Law::C1, Cell([f, g, l, p]));
+    assert_eq!(c1(0, 0, 0, 0), None, "f + g = 0 lies outside");
+    assert_eq!(c1(1, 0, 0, 0), Some(1));
+    assert_eq!(c1(2, 0, 1, 0), Some(2));
+    assert_eq!(c1(3, 1, 0, 0), Some(2), "law: f - 1");
+    assert_eq!(
+        c1(3, 2, 0, 0),
+        Some(2),
+        "the hull is not asked where p is 0"
+    );
+    assert_eq!(c1(3, 2, 0, 1), None, "the hull ends at g = 1");
+    assert_eq!(c1(0, 0, 0, 1), Some(1));
+    assert_eq!(c1(4, 0, 0, 0), None, "no cell of the grid");
+    assert_eq!(
+        table.lookup(Law::C2, Cell([1, 0, 0, 0])),
+        None,
+        "no such law"
+    );
+    assert_eq!(table.lookup(Law::Hold, Cell([1, 2, 0, 1])), Some(3));
+    assert_eq!(table.lookup(Law::Hold, Cell([1, 2, 0, 0])), None);
+    let law = table.law(Law::C1).unwrap();
+    assert_eq!(
+        law.visits(Cell([3, 1, 0, 0])),
+        4,
+        "two of the domain, two of the tree"
+    );
+    assert_eq!(law.worst_visits(), 4);
+    assert_eq!((law.encoding().entries(), law.domain_entries()), (3, 4));
+}
+
+#[test]
+fn every_flipped_byte_and_every_truncation_is_refused() {
+    let image = image();
+    for at in 0..image.len() {
+        for bit in 0..8 {
+            let mut wrong = image.clone();
+            wrong[at] ^= 1 << bit;
+            assert!(TableView::parse(&wrong).is_err(), "bit {bit} of byte {at}");
+        }
+        assert!(TableView::parse(&image[..at]).is_err(), "cut at {at}");
+    }
+    let mut longer = image.clone();
+    longer.push(0);
+    assert!(matches!(error(&longer), TableError::WrongLength { .. }));
+}
+
+#[test]
+fn the_frame_names_what_was_found_and_what_is_supported() {
+    let image = image();
+    assert_eq!(
+        error(&image[..100]),
+        TableError::TooShort {
+            found: 100,
+            needed: 176
+        }
+    );
+    let with = |at: usize, bytes: &[u8]| {
+        let mut image = image.clone();
+        image[at..at + bytes.len()].copy_from_slice(bytes);
+        error(&image)
+    };
+    assert_eq!(with(0, b"ELF!"), TableError::BadMagic { found: *b"ELF!" });
+    assert_eq!(with(4, &[0xFE, 0xFF]), TableError::WrongEndianness);
+    assert_eq!(
+        with(4, &[1, 2]),
+        TableError::BadByteOrderMark { found: 0x0201 }
+    );
+    let version = TableError::UnsupportedVersion {
+        found: 7,
+        supported: FORMAT_VERSION,
+    };
+    assert_eq!(with(6, &[7, 0]), version);
+    let length = TableError::WrongLength {
+        found: 240,
+        stated: 241,
+    };
+    assert_eq!(with(8, &[241]), length);
+    assert!(matches!(with(200, &[9]), TableError::BadCrc { .. }));
+    let foreign = TableView::parse_for_spec(&image, [0; SPEC_HASH_LEN]).unwrap_err();
+    assert_eq!(
+        foreign,
+        TableError::ForeignSpec {
+            found: *b"0123456789abcdef",
+            expected: [0; SPEC_HASH_LEN]
+        }
+    );
+    assert!(TableView::parse_for_spec(&image, *b"0123456789abcdef").is_ok());
+    assert_eq!(
+        seal(&mut [0; 10]).unwrap_err(),
+        WriteError::Length { found: 10 }
+    );
+}
+
+#[test]
+fn header_fields_out_of_range_are_named_by_their_offset() {
+    let cases: &[(usize, &[u8], u16)] = &[
+        (72, &[0], 72),
+        (72, &[33], 72),
+        (68, &[0xFF, 0xFF, 0xFF, 0xFF], 68),
+        (73, &[2], 73),
+        (74, &[0, 0], 74),
+        (76, &[0, 0], 76),
+        (78, &[1, 0], 78),
+        (84, &[0, 0, 0, 0x80], 80),
+        (92, &[1, 0, 0, 0], 88),
+        (100, &[0, 0, 0, 0], 100),
+        (108, &[0, 0, 0, 0], 108),
+        (112, &[0, 0, 0, 0], 112),
+        (120, &[0, 0, 0, 0], 120),
+        (128, &[0, 0, 0, 0], 128),
+        (150, &[1], 148),
+    ];
+    for (at, bytes, offset) in cases {
+        let found = error(&patched(*at, bytes));
+        assert_eq!(found, TableError::BadField { offset: *offset }, "at {at}");
+    }
+    assert!(matches!(
+        error(&patched(44, &[0; 4])),
+        TableError::BadGrid(_)
+    ));
+}
+
+#[test]
+fn blocks_are_refused_for_their_own_reasons() {
+    let of_c1 = |reason| TableError::BadBlock {
+        law: Law::C1,
+        reason,
+    };
+    let cases: &[(&str, usize, &[u8], BlockError)] = &[
+        (
+            "longer than the image",
+            140,
+            &[0xFF, 0xFF],
+            BlockError::OutOfImage,
+        ),
+        (
+            "domain kind",
+            136,
+            &[9],
+            BlockError::UnknownEncoding { found: 9 },
+        ),
+        (
+            "inputs kind",
+            137,
+            &[9],
+            BlockError::UnknownEncoding { found: 9 },
+        ),
+        ("bytes without a domain", 136, &[0], BlockError::BadShape),
+        ("too many half-spaces", 172, &[62], BlockError::BadShape),
+        ("hull larger than the list", 173, &[3], BlockError::BadShape),
+        (
+            "half-space that overflows",
+            186,
+            &[0xFF, 0x7F, 0, 0, 0, 0, 0, 0, 0xFF, 0xFF, 0xFF, 0x7F],
+            BlockError::Overflow,
+        ),
+        (
+            "half-space that does not exist",
+            199,
+            &[0x44],
+            BlockError::BadLevel,
+        ),
+        ("too many laws", 201, &[32], BlockError::BadShape),
+        (
+            "law that overflows",
+            210,
+            &[0xFF, 0xFF, 0xFF, 0x7F],
+            BlockError::Overflow,
+        ),
+        ("level that does not exist", 215, &[4], BlockError::BadLevel),
+        ("law that does not exist", 218, &[33], BlockError::BadLevel),
+        ("delta 0", 214, &[0], BlockError::BadNode),
+        ("left leaf past 63", 217, &[0x80], BlockError::BadNode),
+        (
+            "fewer visits than needed",
+            138,
+            &[3],
+            BlockError::TooManyVisits,
+        ),
+    ];
+    for (what, at, bytes, reason) in cases {
+        assert_eq!(error(&patched(*at, bytes)), of_c1(*reason), "{what}");
+    }
+    let of_hold = |reason| TableError::BadBlock {
+        law: Law::Hold,
+        reason,
+    };
+    assert_eq!(error(&patched(235, &[0x05])), of_hold(BlockError::BadLevel));
+    assert_eq!(error(&patched(219, &[4])), of_hold(BlockError::BadShape));
+    // A directory that leaves bytes over.
+    assert_eq!(
+        error(&patched(168, &[16])),
+        of_hold(BlockError::BadShape),
+        "a dense block cut short"
+    );
+}
+
+/// Bytes of an inputs part as the tree of a law whose domain is everything.
+fn with_tree(tree: &[u8]) -> Vec<u8> {
+    let mut header = header();
+    let domain = [0, 0, LEAF_INSIDE];
+    header.laws[0] = Some(LawEntry {
+        domain_kind: DomainKind::Tree as u8,
+        inputs_kind: InputsKind::Tree as u8,
+        worst_visits: u16::MAX,
+        domain_len: domain.len() as u32,
+        inputs_len: tree.len() as u32,
+    });
+    let mut image = write_header(&header).to_vec();
+    image.extend(domain);
+    image.extend(tree);
+    image.extend([0; CRC_LEN]);
+    seal(&mut image).unwrap();
+    image
+}
+
+fn block_error(tree: &[u8]) -> BlockError {
+    match error(&with_tree(tree)) {
+        TableError::BadBlock { reason, .. } => reason,
+        other => panic!("{other:?}"),
+    }
+}
+
+#[test]
+fn trees_that_are_no_tree_are_refused() {
+    // Left subtree of three bytes, right subtree of three.
+    let good = [0, 0x10, 0x40, 0x0D, 0x41, 0x02, 0x0E, 0x40, 0x03];
+    let image = with_tree(&good);
+    let table = TableView::parse(&image).unwrap();
+    let at = |f, g, l| table.lookup(Law::C1, Cell([f, g, l, 0]));
+    assert_eq!([at(0, 0, 0), at(0, 1, 0)], [Some(1), Some(2)]);
+    assert_eq!([at(2, 0, 0), at(2, 0, 1)], [Some(0), Some(3)]);
+    let mut wrong = good;
+    wrong[2] = 0x41;
+    assert_eq!(
+        block_error(&wrong),
+        BlockError::BadNode,
+        "skip past the left subtree"
+    );
+    assert_eq!(
+        block_error(&good[..6]),
+        BlockError::BadNode,
+        "no right subtree"
+    );
+    assert_eq!(
+        block_error(&[0, 0x0D, 0x40, 1, 9]),
+        BlockError::BadShape,
+        "bytes left over"
+    );
+    assert_eq!(
+        block_error(&[0, 4]),
+        BlockError::BadLevel,
+        "a single leaf past the levels"
+    );
+    assert_eq!(block_error(&[]), BlockError::BadShape);
+    assert_eq!(
+        block_error(&[1, 0, 0]),
+        BlockError::BadShape,
+        "a law cut short"
+    );
+    // 65 nodes in a chain, each with a left leaf; the last has two.
+    let mut chain = vec![0];
+    chain.extend([0x08, 0x00].repeat(64));
+    chain.extend([0x0C, 0x40, 0x01]);
+    assert_eq!(block_error(&chain), BlockError::TooManyVisits);
+    let mut chain = vec![0];
+    chain.extend([0x08, 0x00].repeat(63));
+    chain.extend([0x0C, 0x40, 0x01]);
+    let image = with_tree(&chain);
+    let table = TableView::parse(&image).unwrap();
+    assert_eq!(table.law(Law::C1).unwrap().encoding().worst_visits(), 64);
+}
+
+#[test]
+fn a_tree_needs_a_domain() {
+    let mut header = header();
+    header.laws[0] = Some(LawEntry {
+        domain_kind: DomainKind::InInputs as u8,
+        inputs_kind: InputsKind::Tree as u8,
+        worst_visits: 9,
+        domain_len: 0,
+        inputs_len: 2,
+    });
+    let mut image = write_header(&header).to_vec();
+    image.extend([0, 0, 0, 0, 0, 0]);
+    seal(&mut image).unwrap();
+    let reason = BlockError::NoDomain;
+    let law = Law::C1;
+    assert_eq!(error(&image), TableError::BadBlock { law, reason });
+}
+
+proptest! {
+    #[test]
+    fn arbitrary_bytes_never_panic(bytes in proptest::collection::vec(any::<u8>(), 0..400)) {
+        let _ = TableView::parse(&bytes);
+    }
+
+    /// Blocks of arbitrary bytes under a valid frame: most are refused, and those that are not answer every lookup.
+    #[test]
+    fn arbitrary_blocks_never_panic(
+        domain in proptest::collection::vec(any::<u8>(), 0..40),
+        inputs in proptest::collection::vec(any::<u8>(), 0..60),
+        kinds in (0u8..3, 0u8..3), cells in proptest::collection::vec(any::<[u16; 4]>(), 8),
+    ) {
+        let mut header = header();
+        header.laws[1] = Some(LawEntry {
+            domain_kind: kinds.0,
+            inputs_kind: kinds.1,
+            worst_visits: u16::MAX,
+            domain_len: domain.len() as u32,
+            inputs_len: inputs.len() as u32,
+        });
+        let mut image = write_header(&header).to_vec();
+        image.extend(domain);
+        image.extend(inputs);
+        image.extend([0; CRC_LEN]);
+        seal(&mut image).unwrap();
+        if let Ok(table) = TableView::parse(&image) {
+            look_everywhere(&table, &cells);
+        }
+    }
+
+    /// Trees of mostly valid nodes: lookups end within the stated visits, at a level that exists.
+    #[test]
+    fn accepted_trees_are_total(
+        nodes in proptest::collection::vec((0u8..4, 1u8..4, 0u8..4, 0u8..4, 0u8..4), 1..30),
+        cells in proptest::collection::vec(any::<[u16; 4]>(), 8),
+    ) {
+        let mut tree = vec![0];
+        for (axis, delta, form, left, right) in nodes {
+            match form {
+                0 => tree.extend([axis | 4 | delta << 3, 64 + left, right]),
+                1 => tree.extend([axis | delta << 3, left]),
+                2 => tree.extend([axis | 4 | delta << 3, right]),
+                _ => tree.extend([axis | delta << 3, 64 + left * 3]),
+            }
+        }
+        tree.extend([0x0C, 0x40, 0x01]);
+        let image = with_tree(&tree);
+        if let Ok(table) = TableView::parse(&image) {
+            look_everywhere(&table, &cells);
+        }
+    }
+}
+
+fn look_everywhere(table: &TableView<'_>, others: &[[u16; 4]]) {
+    let grid = table.header().grid;
+    let count = grid.count();
+    for index in 0..grid.cells() {
+        let mut rest = index;
+        let cell = Cell(count.map(|n| {
+            let at = rest % u32::from(n);
+            rest /= u32::from(n);
+            at as u16
+        }));
+        for law in Law::ALL {
+            let level = table.lookup(law, cell);
+            assert!(level.is_none_or(|level| level < table.header().levels));
+            if let Some(view) = table.law(law) {
+                assert!(view.visits(cell) <= view.worst_visits());
+            }
+        }
+    }
+    for cell in others {
+        for law in Law::ALL {
+            let outside = grid.index(Cell(*cell)).is_none();
+            assert!(!outside || table.lookup(law, Cell(*cell)).is_none());
+        }
+    }
+}

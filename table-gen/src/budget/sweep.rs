@@ -1,0 +1,187 @@
+//! Guarantee against bytes: variants of a spec, each synthesised and compressed, and which of them nothing beats.
+
+use std::fmt::Write as _;
+
+use serde::Serialize;
+
+use crate::compress::{self, CompressError, Options};
+use crate::game::{GameError, Watch};
+use crate::spec::Spec;
+use crate::synthesis::{self, SynthesisError};
+
+/// A variant of a spec.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Variant {
+    /// Factor on every cell width.
+    pub width_factor: f64,
+    /// Period \[s\].
+    pub period_s: f64,
+    /// Relative error of participation.
+    pub participation: f64,
+}
+
+/// How a variant came out.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Outcome {
+    /// The variant.
+    #[serde(flatten)]
+    pub variant: Variant,
+    /// Bytes of the table; absent where there is none.
+    pub table_bytes: Option<usize>,
+    /// Worst-case time from outside I1 into I2 \[s\]: steps of C1 and C2.
+    pub settle_s: Option<f64>,
+    /// Winning cells of C1.
+    pub winning_cells: Option<usize>,
+    /// Why there is no table.
+    pub reason: Option<String>,
+    /// Whether no variant with at least this participation error is both smaller and faster.
+    pub pareto: bool,
+}
+
+/// The spec of a variant.
+fn spec_of(spec: &Spec, variant: &Variant) -> Spec {
+    let mut spec = spec.clone();
+    for width in &mut spec.grid.width {
+        *width *= variant.width_factor;
+    }
+    spec.sampling.period_s = variant.period_s;
+    spec.uncertainty.participation = variant.participation;
+    spec
+}
+
+/// Synthesises and compresses a variant. What makes a variant impossible is part of its outcome.
+///
+/// # Errors
+/// An interruption.
+pub fn try_variant<'w>(
+    spec: &Spec,
+    variant: Variant,
+    options: &Options,
+    watch: &dyn Fn(&'static str) -> Box<dyn Watch + 'w>,
+) -> Result<Outcome, GameError> {
+    let mut outcome = Outcome {
+        variant,
+        table_bytes: None,
+        settle_s: None,
+        winning_cells: None,
+        reason: None,
+        pareto: false,
+    };
+    let spec = spec_of(spec, &variant);
+    let synthesis = match synthesis::synthesise(&spec, watch) {
+        Ok(synthesis) => synthesis,
+        Err(SynthesisError::Game {
+            error: GameError::Interrupted,
+            ..
+        }) => return Err(GameError::Interrupted),
+        Err(error) => {
+            outcome.reason = Some(error.to_string());
+            return Ok(outcome);
+        }
+    };
+    outcome.winning_cells = Some(synthesis.c1.solution.winning);
+    match compress::table(&spec, &synthesis, options, watch) {
+        Ok((bytes, laws)) => {
+            let steps: u32 = laws
+                .laws
+                .iter()
+                .map(|law| u32::from(law.report.steps))
+                .sum();
+            outcome.table_bytes = Some(bytes.len());
+            outcome.settle_s = Some(f64::from(steps) * variant.period_s);
+        }
+        Err(CompressError::Game(GameError::Interrupted)) => return Err(GameError::Interrupted),
+        Err(error) => outcome.reason = Some(error.to_string()),
+    }
+    Ok(outcome)
+}
+
+/// Marks the outcomes that no other beats: one that bears at least as much participation error, is no larger and no
+/// slower, and better in one of the three.
+pub fn mark_pareto(outcomes: &mut [Outcome]) {
+    let keys: Vec<Option<(f64, usize, f64)>> = outcomes
+        .iter()
+        .map(|o| Some((o.variant.participation, o.table_bytes?, o.settle_s?)))
+        .collect();
+    for (outcome, key) in outcomes.iter_mut().zip(&keys) {
+        let Some(mine) = key else { continue };
+        outcome.pareto = !keys.iter().flatten().any(|other| {
+            other.0 >= mine.0 && other.1 <= mine.1 && other.2 <= mine.2 && other != mine
+        });
+    }
+}
+
+/// Size of the picture and its margin.
+const WIDTH: f64 = 640.0;
+const HEIGHT: f64 = 400.0;
+const MARGIN: f64 = 50.0;
+
+/// Bytes (logarithmic) against settling time as an SVG; the front is filled.
+pub fn svg(outcomes: &[Outcome]) -> String {
+    let points: Vec<(f64, f64, &Outcome)> = outcomes
+        .iter()
+        .filter_map(|o| Some(((o.table_bytes? as f64).log10(), o.settle_s?, o)))
+        .collect();
+    let span = |values: &dyn Fn(&(f64, f64, &Outcome)) -> f64| {
+        let low = points.iter().map(values).fold(f64::INFINITY, f64::min);
+        let high = points.iter().map(values).fold(f64::NEG_INFINITY, f64::max);
+        (low, (high - low).max(1e-9))
+    };
+    let (x_low, x_span) = span(&|point| point.0);
+    let (y_low, y_span) = span(&|point| point.1);
+    let mut out = format!(
+        "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{WIDTH}\" height=\"{HEIGHT}\" font-family=\"sans-serif\" font-size=\"11\">\n"
+    );
+    for (x, y, outcome) in &points {
+        let at_x = MARGIN + (x - x_low) / x_span * (WIDTH - 2.0 * MARGIN);
+        let at_y = HEIGHT - MARGIN - (y - y_low) / y_span * (HEIGHT - 2.0 * MARGIN);
+        let fill = if outcome.pareto { "#1f5fa8" } else { "none" };
+        // Writing to a String cannot fail.
+        let _ = writeln!(
+            out,
+            "<circle cx=\"{at_x:.1}\" cy=\"{at_y:.1}\" r=\"4\" fill=\"{fill}\" stroke=\"#1f5fa8\"><title>width x{}, period {} s, participation error {}: {} bytes, {y:.1} s</title></circle>",
+            outcome.variant.width_factor,
+            outcome.variant.period_s,
+            outcome.variant.participation,
+            outcome.table_bytes.unwrap_or(0),
+        );
+    }
+    let _ = writeln!(
+        out,
+        "<text x=\"{MARGIN}\" y=\"{:.0}\">table bytes (logarithmic) to the right, worst time to I2 [s] upwards; filled: nothing is better</text>\n</svg>",
+        HEIGHT - 12.0
+    );
+    out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn outcome(participation: f64, bytes: usize, settle_s: f64) -> Outcome {
+        Outcome {
+            variant: Variant {
+                width_factor: 1.0,
+                period_s: 1.0,
+                participation,
+            },
+            table_bytes: Some(bytes),
+            settle_s: Some(settle_s),
+            winning_cells: None,
+            reason: None,
+            pareto: false,
+        }
+    }
+
+    #[test]
+    fn the_front_holds_what_nothing_beats() {
+        let mut outcomes = [
+            outcome(0.0, 100, 20.0),
+            outcome(0.0, 200, 10.0),
+            outcome(0.0, 200, 20.0),
+            outcome(0.1, 300, 30.0),
+        ];
+        mark_pareto(&mut outcomes);
+        assert_eq!(outcomes.map(|o| o.pareto), [true, true, false, true]);
+    }
+}
