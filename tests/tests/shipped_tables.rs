@@ -1,0 +1,40 @@
+//! The tables in firmware/tables: made again from their specs byte for byte, and proven.
+#![allow(clippy::unwrap_used, reason = "a test that cannot go on fails")]
+
+use table_gen::game::{Unwatched, Watch};
+use table_gen::pipeline;
+use table_gen::spec::Spec;
+use table_gen::verify;
+
+#[test]
+fn every_shipped_table_regenerates_and_is_proven() {
+    let folder = tests::root().join("firmware/tables");
+    let mut names: Vec<String> = std::fs::read_dir(&folder)
+        .unwrap()
+        .map(|entry| entry.unwrap().path())
+        .filter(|path| path.extension().is_some_and(|ending| ending == "bin"))
+        .map(|path| path.file_stem().unwrap().to_str().unwrap().to_owned())
+        .collect();
+    names.sort();
+    for needed in ["paper-bi", "paper-uni"] {
+        assert!(
+            names.iter().any(|name| name == needed),
+            "{needed} is not shipped"
+        );
+    }
+    for name in names {
+        let spec = Spec::load(&name, &[]).unwrap();
+        let watch = |_| Box::new(Unwatched) as Box<dyn Watch>;
+        let made = pipeline::table_bytes(&spec, None, &watch).unwrap();
+        let shipped = std::fs::read(folder.join(format!("{name}.bin"))).unwrap();
+        assert!(
+            made == shipped,
+            "firmware/tables/{name}.bin ({} bytes) is not what its spec gives ({} bytes): \
+             cargo run --release -- build {name}, then copy out/table.bin there",
+            shipped.len(),
+            made.len()
+        );
+        let verdict = verify::verify(&shipped, &spec, &|_| true).unwrap();
+        assert!(verdict.verified, "{name}: {:?}", verdict.claims);
+    }
+}
