@@ -20,7 +20,6 @@ use firmware::dispatch::unidirectional::Unidirectional;
 use firmware::fault::ResetCause;
 use firmware::flash;
 use firmware::frequency::zero_crossing::ZeroCrossing;
-use firmware::table::TableView;
 use firmware::telemetry::{FRAME_MAX, Frame, TableId, encode};
 use panic_halt as _;
 
@@ -91,10 +90,10 @@ fn run(source: ZeroCrossing) {
         Limits::all(black_box(32_000)),
     );
     let image = flash::image(table_region::bytes());
-    let table = TableView::parse(image).ok().map(|view| TableId::of(&view));
     let config = ChargerConfig::DEFAULT;
     let cause = black_box(ResetCause::PowerOn);
     let mut charger = Charger::new(source, dispatch, Pin, image, config, cause);
+    let table = charger.table().map(TableId::of);
     let (mut now_ms, mut stamp, mut tick) = (0u32, 0u32, 0u32);
     let mut frame = [0; FRAME_MAX];
     loop {

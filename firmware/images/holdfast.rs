@@ -26,7 +26,6 @@ use firmware::dispatch::unidirectional::Unidirectional;
 use firmware::fault::ResetCause;
 use firmware::flash;
 use firmware::frequency::zero_crossing::ZeroCrossing;
-use firmware::table::TableView;
 use firmware::telemetry::{FRAME_MAX, Frame, TableId, encode};
 use stm32f4xx_hal::pac;
 use stm32f4xx_hal::prelude::*;
@@ -165,9 +164,9 @@ fn run(peripherals: pac::Peripherals) {
         Limits::all(CABLE_MA),
     );
     let image = flash::image(table_region::bytes());
-    let table = TableView::parse(image).ok().map(|view| TableId::of(&view));
     let config = ChargerConfig::DEFAULT;
     let mut charger = Charger::new(source, dispatch, Dog(dog), image, config, cause);
+    let table = charger.table().map(TableId::of);
     let tick_ms = u32::from(charger.tick_ms());
 
     let mut clock = Clock {

@@ -4,9 +4,9 @@
 //! of it can be missing. Nothing here fails: what is wrong at a tick is in the [`Report`].
 //!
 //! ## Time
-//! The caller ticks every `tick_ms` by a millisecond clock that may wrap. A late tick advances observer and control loop by
-//! the ticks that were missed, up to [`CATCH_UP_TICKS_MAX`], with the frequency interpolated; a larger step of the clock, or
-//! one backwards, makes the observer start again. A tick that comes too early advances nothing.
+//! The caller ticks every `tick_ms` by a millisecond clock that may wrap. A late tick advances the observer by the ticks that
+//! were missed, up to [`CATCH_UP_TICKS_MAX`], with the frequency interpolated, and the period's clock with it, and decides
+//! once; a larger step of the clock, or one backwards, makes the observer start again. A tick that comes too early advances nothing.
 //!
 //! ## Trust
 //! After a start nobody knows the governor chain: the grid may be in the middle of an event. The observer's initial error
@@ -24,7 +24,7 @@ use crate::phase::Phase;
 use crate::table::{PlantParameters, TableError, TableView};
 use crate::units::{Participation, State};
 
-/// Most ticks made good by one late tick. They cost a tick's work each, and longer gaps make the interpolation a guess.
+/// Most ticks made good by one late tick: longer gaps make the interpolation a guess.
 pub const CATCH_UP_TICKS_MAX: u16 = 5;
 /// Tick without a table \[ms\].
 pub const TICK_MS_DEFAULT: u16 = 100;
@@ -133,6 +133,18 @@ impl<'t, S: FrequencySource, D: Dispatch, W: Watchdog> Charger<'t, S, D, W> {
         cause: ResetCause,
     ) -> Self {
         let table = TableView::parse(table);
+        Self::with_table(source, dispatch, watchdog, table, config, cause)
+    }
+
+    /// The same for a table that was parsed already, as where many chargers share one.
+    pub fn with_table(
+        source: S,
+        dispatch: D,
+        watchdog: W,
+        table: Result<TableView<'t>, TableError>,
+        config: ChargerConfig,
+        cause: ResetCause,
+    ) -> Self {
         let (tick_ms, droop, plant) = match &table {
             Ok(view) => {
                 let header = view.header();
@@ -198,6 +210,11 @@ impl<'t, S: FrequencySource, D: Dispatch, W: Watchdog> Charger<'t, S, D, W> {
     /// Why the table was rejected, if it was.
     pub fn table_error(&self) -> Option<TableError> {
         self.control.table_error()
+    }
+
+    /// The table, if it was accepted.
+    pub fn table(&self) -> Option<&TableView<'t>> {
+        self.control.table()
     }
 
     /// The source, to hand it captures.
@@ -309,6 +326,12 @@ impl<'t, S: FrequencySource, D: Dispatch, W: Watchdog> Charger<'t, S, D, W> {
             let way = i64::from(f_uhz) - i64::from(from);
             let at = i64::from(from) + way * i64::from(n) / i64::from(due.max(1));
             self.advance(at as i32, report);
+        }
+        if due > 0 {
+            // What was held stayed held: one decision, however many ticks were missed.
+            let missed = due - 1;
+            self.control.skip(missed);
+            self.warm_up_left = self.warm_up_left.saturating_sub(missed);
             self.decide(report);
         }
     }

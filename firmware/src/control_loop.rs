@@ -63,6 +63,11 @@ impl<'t> ControlLoop<'t> {
         self.table.as_ref().err().copied()
     }
 
+    /// The table, if it was accepted.
+    pub fn table(&self) -> Option<&TableView<'t>> {
+        self.table.as_ref().ok()
+    }
+
     /// Phase, level and clock as they stand.
     pub fn phase_state(&self) -> PhaseState {
         self.state
@@ -89,6 +94,12 @@ impl<'t> ControlLoop<'t> {
             phase: next.phase,
             source,
         }
+    }
+
+    /// Lets the period's clock run on by ticks that nobody measured; a decision that fell due meanwhile is made at the next
+    /// [`ControlLoop::step`].
+    pub fn skip(&mut self, ticks: u16) {
+        self.state.ticks_left = self.state.ticks_left.saturating_sub(ticks);
     }
 
     /// Forgets the event: back to No control.

@@ -1,6 +1,7 @@
 //! The table format: bytes written by hand, every way in which an image can be wrong, and total lookups.
 #![allow(
     clippy::unwrap_used,
+    clippy::expect_used,
     clippy::panic,
     reason = "a test that cannot go on fails"
 )]

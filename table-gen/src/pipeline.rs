@@ -2,8 +2,9 @@
 
 use std::path::{Path, PathBuf};
 
-use firmware::table::{TableError, TableView};
+use firmware::table::{Law, TableError, TableView};
 
+use crate::compress::{self, CompressError, LawReport, Options};
 use crate::emit::{self, EmitError, dense};
 use crate::game::Watch;
 use crate::spec::Spec;
@@ -15,6 +16,9 @@ pub enum PipelineError {
     /// No laws.
     #[error(transparent)]
     Synthesis(#[from] SynthesisError),
+    /// No compressed laws.
+    #[error(transparent)]
+    Compress(#[from] CompressError),
     /// No bytes.
     #[error(transparent)]
     Emit(#[from] EmitError),
@@ -36,22 +40,71 @@ pub enum PipelineError {
     },
 }
 
+/// How the laws become bytes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Encoding {
+    /// Bit-packed arrays, the lowest allowed input of each cell: the oracle of the other.
+    Dense,
+    /// Trees, compressed with these options.
+    Tree(Options),
+}
+
+impl Default for Encoding {
+    fn default() -> Self {
+        Self::Tree(Options {
+            keep_minimal_time: false,
+            exact_domain: false,
+        })
+    }
+}
+
+/// A table and what compression cost.
+#[derive(Debug, Clone)]
+pub struct Emitted {
+    /// The image.
+    pub bytes: Vec<u8>,
+    /// Law by law; empty for the dense encoding.
+    pub laws: Vec<(Law, LawReport)>,
+}
+
 /// The table of a spec's laws.
 ///
 /// # Errors
-/// Numbers that do not fit the format.
-pub fn emit(spec: &Spec, synthesis: &Synthesis) -> Result<Vec<u8>, EmitError> {
+/// Numbers that do not fit the format, or an interruption.
+pub fn emit<'w>(
+    spec: &Spec,
+    synthesis: &Synthesis,
+    encoding: Encoding,
+    watch: &dyn Fn(&'static str) -> Box<dyn Watch + 'w>,
+) -> Result<Emitted, PipelineError> {
     let header = emit::header(spec, synthesis.grid)?;
-    let shape = synthesis::grid_shape(&synthesis.grid);
-    let encode = |law: &synthesis::SolvedLaw| {
-        dense::encode(&shape, header.levels, &law.solution, &dense::lowest)
+    let options = match encoding {
+        Encoding::Tree(options) => options,
+        Encoding::Dense => {
+            let shape = synthesis::grid_shape(&synthesis.grid);
+            let encode = |law: &synthesis::SolvedLaw| {
+                dense::encode(&shape, header.levels, &law.solution, &dense::lowest)
+            };
+            let laws = [
+                Some(encode(&synthesis.c1)),
+                synthesis.c2.as_ref().map(encode),
+                synthesis.hold.as_ref().map(encode),
+            ];
+            return Ok(Emitted {
+                bytes: emit::assemble(header, &laws)?,
+                laws: Vec::new(),
+            });
+        }
     };
-    let laws = [
-        Some(encode(&synthesis.c1)),
-        synthesis.c2.as_ref().map(encode),
-        synthesis.hold.as_ref().map(encode),
-    ];
-    emit::assemble(header, &laws)
+    let compressed = compress::compress(spec, synthesis, &options, watch)?;
+    Ok(Emitted {
+        bytes: emit::assemble(header, &compressed.encoded())?,
+        laws: compressed
+            .laws
+            .into_iter()
+            .map(|law| (law.law, law.report))
+            .collect(),
+    })
 }
 
 /// A table for a spec: from a file, which must have been made for it, or synthesised.
@@ -65,7 +118,7 @@ pub fn table_bytes<'w>(
 ) -> Result<Vec<u8>, PipelineError> {
     let Some(path) = file else {
         let synthesis = synthesis::synthesise(spec, watch)?;
-        return Ok(emit(spec, &synthesis)?);
+        return Ok(emit(spec, &synthesis, Encoding::default(), watch)?.bytes);
     };
     let bytes = std::fs::read(path).map_err(|error| PipelineError::Read {
         path: path.to_owned(),

@@ -62,6 +62,14 @@ pub struct Synthesis {
 /// Why there are no laws.
 #[derive(Debug, thiserror::Error)]
 pub enum SynthesisError {
+    /// An uncertainty that the games do not cover.
+    #[error(
+        "uncertainty.actuation_delay_s = {delay_s}: the games do not cover a delay yet; allowed: 0 (simulate --delay-s shows its effect)"
+    )]
+    Delay {
+        /// The delay asked for \[s\].
+        delay_s: f64,
+    },
     /// The spec's grid is not one for the device.
     #[error("the grid does not fit the device: {0:?}")]
     Grid(GridError),
@@ -256,6 +264,10 @@ pub fn synthesise<'w>(
     spec: &Spec,
     watch: &dyn Fn(&'static str) -> Box<dyn Watch + 'w>,
 ) -> Result<Synthesis, SynthesisError> {
+    let delay_s = spec.uncertainty.actuation_delay_s;
+    if delay_s != 0.0 {
+        return Err(SynthesisError::Delay { delay_s });
+    }
     let grid = device_grid(spec).map_err(SynthesisError::Grid)?;
     let before = usage::cpu_s();
     let abstraction = abstraction(spec, &grid)?;

@@ -5,7 +5,8 @@
 //! | `sizes.txt` | flash and static RAM by section, panics, allocation, float formatting | the ELF files |
 //! | `run.txt` | stack, instructions of a lookup and of a tick | QEMU: painted stack, system timer under `-icount` |
 //!
-//! Every figure must stay within its goal. The text itself must be equal as well, as long as compiler and table are those
+//! A figure past its goal fails, but for the misses that the file already states: those are told at every run. The text
+//! itself must be equal as well, as long as compiler and table are those
 //! that the file names; with others a difference is only shown.
 
 use std::fmt::Write as _;
@@ -17,7 +18,7 @@ use std::time::Duration;
 
 use firmware::link::session::{Session, Wires};
 use firmware::link::{Request, Response};
-use firmware::table::{Law, TableView, checksum};
+use firmware::table::{Law, TableView};
 
 use crate::images::{self, BARE, Elf, HOLDFAST, ImageError, PIL};
 use crate::pil::qemu::{PilError, Target, instructions};
@@ -64,7 +65,7 @@ pub enum CostError {
     /// A symbol of the image is missing.
     #[error("the image has no symbol {0}")]
     Symbol(&'static str),
-    /// A figure is past its goal, or differs.
+    /// A figure misses its goal for the first time, or differs.
     #[error("{0}")]
     Wrong(String),
 }
@@ -78,18 +79,22 @@ fn io_error(what: impl Into<String>) -> impl FnOnce(io::Error) -> CostError {
 #[derive(Debug, Default)]
 pub struct Figures {
     text: String,
-    past: Vec<String>,
+    missed: Vec<String>,
 }
 
 impl Figures {
     fn line(&mut self, name: &str, value: u32, unit: &str, goal: Option<u32>) {
-        let goal_text = goal.map_or_else(String::new, |goal| format!("  goal at most {goal}"));
-        // Writing to a String cannot fail.
-        let _ = writeln!(self.text, "{name:<44}{value:>8} {unit}{goal_text}");
+        let goal_text = match goal {
+            None => String::new(),
+            Some(goal) if value <= goal => format!("  goal at most {goal}"),
+            Some(goal) => format!("  goal at most {goal}: MISSED by {}", value - goal),
+        };
+        let line = format!("{name:<44}{value:>8} {unit}{goal_text}");
         if goal.is_some_and(|goal| value > goal) {
-            self.past
-                .push(format!("{name}: {value} {unit},{goal_text}"));
+            self.missed.push(line.clone());
         }
+        self.text.push_str(&line);
+        self.text.push('\n');
     }
 
     fn note(&mut self, text: &str) {
@@ -104,16 +109,28 @@ impl Figures {
     /// Compares with the committed file, or replaces it.
     ///
     /// # Errors
-    /// A goal is missed, or a figure differs although compiler and table are the file's.
+    /// A goal is missed that the file does not show as missed, or a figure differs although compiler and table are the
+    /// file's.
     pub fn check(&self, file: &str, bless: bool) -> Result<(), CostError> {
         let path = root().join("firmware/expected").join(file);
         if bless {
             fs::write(&path, &self.text).map_err(io_error(path.display().to_string()))?;
         }
-        if !self.past.is_empty() {
-            return Err(CostError::Wrong(self.past.join("\n")));
-        }
         let committed = fs::read_to_string(&path).map_err(io_error(path.display().to_string()))?;
+        // A goal that the committed figures miss already is told every time; a new miss fails, whatever the table.
+        let known = |line: &&String| committed.lines().any(|old| old == line.as_str());
+        for line in self.missed.iter().filter(known) {
+            println!("    {file}: known miss: {line}");
+        }
+        let new: Vec<&str> = self
+            .missed
+            .iter()
+            .filter(|line| !known(line))
+            .map(String::as_str)
+            .collect();
+        if !new.is_empty() {
+            return Err(CostError::Wrong(new.join("\n")));
+        }
         let notes = |text: &str| -> Vec<String> {
             let lines = text.lines().filter(|line| line.starts_with('#'));
             lines.map(str::to_owned).collect()
@@ -128,7 +145,7 @@ impl Figures {
             Err(CostError::Wrong(message))
         } else {
             println!(
-                "    {file}: other compiler or table than committed; goals are met:\n{differs}"
+                "    {file}: other compiler or table than committed; no new goal is missed:\n{differs}"
             );
             Ok(())
         }
@@ -168,7 +185,7 @@ pub fn sizes() -> Result<Figures, CostError> {
     let mut figures = Figures::default();
     figures.note(&compiler());
     for image in [HOLDFAST, BARE] {
-        let elf = Elf::read(&images::build(image)?)?;
+        let elf = Elf::read(&images::build(image, images::TARGET)?)?;
         let (mut ram, mut code) = (0, 0);
         for section in elf.sections()? {
             // The table is the spec's business, not the code's: `table-gen budget` tells its size.
@@ -220,12 +237,12 @@ pub fn sizes() -> Result<Figures, CostError> {
 pub fn run(table: &[u8]) -> Result<Figures, CostError> {
     let mut figures = Figures::default();
     figures.note(&compiler());
-    figures.note(&format!(
-        "table of {} bytes, CRC {:08x}",
-        table.len(),
-        checksum(table)
-    ));
-    let bare = Elf::read(&images::build(BARE)?)?;
+    // The CRC that the table carries: that of bytes with their own CRC behind them is the same for every table.
+    let crc = table
+        .last_chunk::<4>()
+        .map_or(0, |crc| u32::from_le_bytes(*crc));
+    figures.note(&format!("table of {} bytes, CRC {crc:08x}", table.len()));
+    let bare = Elf::read(&images::build(BARE, images::TARGET)?)?;
     let stack = painted_stack(&bare, table)?;
     let ram: u32 = bare
         .sections()?
@@ -241,7 +258,7 @@ pub fn run(table: &[u8]) -> Result<Figures, CostError> {
         Some(RAM_MAX),
     );
 
-    let pil = images::build(PIL)?;
+    let pil = images::build(PIL, images::TARGET)?;
     let mut target = Target::start(&pil, table, true)?;
     let wires = Wires::default();
     let mut host = Session::new(&wires, table);

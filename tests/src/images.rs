@@ -11,8 +11,10 @@ use object::{Endianness, Object, ObjectSection, ObjectSymbol, SectionKind};
 
 use crate::root;
 
-/// Target of the images.
+/// Target of the images: the reference board's Cortex-M4F.
 pub const TARGET: &str = "thumbv7em-none-eabihf";
+/// Cortex-M0+, without FPU. Its instructions are a subset of the reference board's, so that an image runs there too.
+pub const TARGET_M0: &str = "thumbv6m-none-eabi";
 /// Start of the FLASH region, from memory.x.
 const FLASH: u32 = 0x0800_0000;
 /// Start of the TABLE region, from memory.x.
@@ -89,10 +91,10 @@ fn cargo() -> OsString {
 ///
 /// # Errors
 /// Cargo is not there, or does not build it.
-pub fn build(image: Image) -> Result<PathBuf, ImageError> {
+pub fn build(image: Image, target: &str) -> Result<PathBuf, ImageError> {
     let output = Command::new(cargo())
         .args(["build", "--package", "firmware", "--profile", "firmware"])
-        .args(["--target", TARGET, "--bin", image.name])
+        .args(["--target", target, "--bin", image.name])
         .args(["--features", image.features])
         .args(["--message-format", "json-render-diagnostics"])
         .current_dir(root())

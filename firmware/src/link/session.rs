@@ -19,7 +19,7 @@ use crate::fault::ResetCause;
 use crate::frequency::ade7953::{self, Ade7953, BusError, Registers};
 use crate::frequency::zero_crossing::ZeroCrossing;
 use crate::frequency::{FrequencyError, FrequencySource, Reading};
-use crate::table::{Law, TableView};
+use crate::table::{Law, TableError, TableView};
 use crate::telemetry::{Frame, TableId, phase_number};
 use crate::units::{Participation, State};
 
@@ -212,6 +212,11 @@ impl<'w> Session<'w> {
             control: ControlLoop::with_table(view),
             charger: None,
         }
+    }
+
+    /// Why the table was rejected, if it was.
+    pub fn table_error(&self) -> Option<TableError> {
+        self.control.table_error()
     }
 
     /// Answers a request.

@@ -16,7 +16,7 @@
 //! **Errors of the estimate.** The cell that the controller sees may differ from the real state by e on each axis. The
 //! real state before the step lies in the cell widened by e; the estimate after it in the successor widened by e again.
 
-use super::{Abstraction, BlockReach, CellBox, Extents};
+use super::{Abstraction, BlockCore, BlockExtents, CellBox, Extents};
 use crate::flow::{Flow, Matrix, Vector, absolute_integral, metzler};
 use crate::grid_shape::GridShape;
 use crate::interval::Interval;
@@ -116,6 +116,9 @@ pub struct AffineAbstraction<const D: usize> {
     block: [u32; D],
     core: Option<[u32; D]>,
     hull: [u32; D],
+    hull_of_all: [u32; D],
+    /// Lowest offset and highest end (offset plus span) over all inputs; meaningful with one mode.
+    ends_of_all: [(i64, i64); D],
 }
 
 impl<const D: usize> AffineAbstraction<D> {
@@ -178,6 +181,8 @@ impl<const D: usize> AffineAbstraction<D> {
             block: [1; D],
             core: None,
             hull: [1; D],
+            hull_of_all: [1; D],
+            ends_of_all: [(0, 0); D],
         };
         abstraction.choose_block();
         Ok(abstraction)
@@ -242,6 +247,20 @@ impl<const D: usize> AffineAbstraction<D> {
             hull[d] = hull[d].min(self.shape.count[d]);
         }
         self.hull = hull;
+        for d in 0..D {
+            let low = self.steps.iter().map(|step| step.offset[d]).min();
+            let high = self.steps.iter().map(|s| s.offset[d] + s.span[d]).max();
+            let (low, high) = (low.unwrap_or(0), high.unwrap_or(0));
+            self.ends_of_all[d] = (low, high);
+            let (down, up) = self.modes[0].travel[d];
+            let cells = ((high - low + up - down) >> FRACTION_BITS) as u32 + 2;
+            // Modes differ in their tables: with more than one, the hull of all is the grid.
+            self.hull_of_all[d] = if self.modes.len() == 1 {
+                cells.min(self.shape.count[d])
+            } else {
+                self.shape.count[d]
+            };
+        }
     }
 
     /// Smallest extent, in cells, of the part that the boxes of a block of this shape share; negative if none.
@@ -255,6 +274,30 @@ impl<const D: usize> AffineAbstraction<D> {
             }
         }
         margin
+    }
+
+    /// A range of cells on an axis, moved into the grid and widened to a fixed size; `None` if it misses the grid.
+    #[inline]
+    fn clipped(&self, axis: usize, (lowest, highest): (i64, i64), size: u32) -> Option<(u32, u32)> {
+        let count = i64::from(self.shape.count[axis]);
+        if size == self.shape.count[axis] {
+            return Some((0, size - 1));
+        }
+        if highest < 0 || lowest >= count {
+            return None;
+        }
+        let low = lowest.clamp(0, count - i64::from(size)) as u32;
+        Some((low, low + size - 1))
+    }
+
+    /// Table sums of an anchored cell in a mode.
+    #[inline]
+    fn sums_of(&self, anchor: &AffineAnchor<D>, mode: usize) -> [i64; D] {
+        if mode == 0 {
+            anchor.sums
+        } else {
+            self.sums(mode, anchor.cell)
+        }
     }
 
     fn sums(&self, mode: usize, cell: [u32; D]) -> [i64; D] {
@@ -420,11 +463,7 @@ impl<const D: usize> Abstraction<D> for AffineAbstraction<D> {
     #[inline]
     fn successor(&self, anchor: &AffineAnchor<D>, input: usize) -> Option<CellBox<D>> {
         let step = &self.steps[input];
-        let sums = if step.mode == 0 {
-            anchor.sums
-        } else {
-            self.sums(step.mode, anchor.cell)
-        };
+        let sums = self.sums_of(anchor, step.mode);
         let (mut low, mut high) = ([0u32; D], [0u32; D]);
         let mut inside = true;
         for d in 0..D {
@@ -445,47 +484,64 @@ impl<const D: usize> Abstraction<D> for AffineAbstraction<D> {
         self.block
     }
 
-    fn block_extents(&self) -> Option<(Option<[u32; D]>, [u32; D])> {
-        Some((self.core, self.hull))
+    fn block_extents(&self) -> Option<BlockExtents<D>> {
+        Some(BlockExtents {
+            core: self.core,
+            hull: self.hull,
+            hull_of_all: self.hull_of_all,
+        })
     }
 
-    fn block_reach(&self, first: [u32; D], input: usize) -> Option<BlockReach<D>> {
-        let step = &self.steps[input];
-        let sums = self.sums(step.mode, first);
-        let mut core = CellBox {
+    #[inline]
+    fn block_hull(&self, first: &AffineAnchor<D>, input: Option<usize>) -> Option<CellBox<D>> {
+        let (mode, size) = match input {
+            None => (0, &self.hull_of_all),
+            Some(input) => (self.steps[input].mode, &self.hull),
+        };
+        let sums = self.sums_of(first, mode);
+        let mut hull = CellBox {
             low: [0; D],
             high: [0; D],
         };
-        let mut hull = core;
-        let mut core_inside = true;
         for d in 0..D {
-            let count = i64::from(self.shape.count[d]);
-            let (down, up) = self.modes[step.mode].travel[d];
-            let at = sums[d] + step.offset[d];
-            // Every box of the block starts at or below `at + up` and ends at or above `at + down + span`.
-            let shared = (at + up) >> FRACTION_BITS;
-            if let Some(extent) = self.core {
-                let last = shared + i64::from(extent[d]) - 1;
-                core_inside &= shared >= 0 && last < count;
-                core.low[d] = shared.max(0) as u32;
-                core.high[d] = last.max(0) as u32;
-            }
-            let lowest = (at + down) >> FRACTION_BITS;
-            let highest = (at + up + step.span[d]) >> FRACTION_BITS;
-            if highest < 0 || lowest >= count {
-                return None;
-            }
-            let lowest = lowest.clamp(0, count - i64::from(self.hull[d]));
-            hull.low[d] = lowest as u32;
-            hull.high[d] = (lowest + i64::from(self.hull[d]) - 1) as u32;
+            let (low, high) = match input {
+                None => self.ends_of_all[d],
+                Some(input) => {
+                    let step = &self.steps[input];
+                    (step.offset[d], step.offset[d] + step.span[d])
+                }
+            };
+            let (down, up) = self.modes[mode].travel[d];
+            let lowest = (sums[d] + low + down) >> FRACTION_BITS;
+            let highest = (sums[d] + high + up) >> FRACTION_BITS;
+            (hull.low[d], hull.high[d]) = self.clipped(d, (lowest, highest), size[d])?;
         }
-        match self.core {
-            Some(_) if !core_inside => None,
-            Some(_) => Some(BlockReach {
-                core: Some(core),
-                hull,
-            }),
-            None => Some(BlockReach { core: None, hull }),
+        Some(hull)
+    }
+
+    #[inline]
+    fn block_core(&self, first: &AffineAnchor<D>, input: usize) -> BlockCore<D> {
+        let Some(extent) = &self.core else {
+            return BlockCore::Unknown;
+        };
+        let step = &self.steps[input];
+        let sums = self.sums_of(first, step.mode);
+        let (mut low, mut high) = ([0u32; D], [0u32; D]);
+        let mut inside = true;
+        for d in 0..D {
+            // Every box of the block starts at or below the first's start plus the travel upwards, and is that much longer
+            // than the core.
+            let (_, up) = self.modes[step.mode].travel[d];
+            let from = (sums[d] + step.offset[d] + up) >> FRACTION_BITS;
+            let to = from + i64::from(extent[d]) - 1;
+            inside &= from >= 0 && to < i64::from(self.shape.count[d]);
+            low[d] = from as u32;
+            high[d] = to as u32;
+        }
+        if inside {
+            BlockCore::Shared(CellBox { low, high })
+        } else {
+            BlockCore::Leaves
         }
     }
 }

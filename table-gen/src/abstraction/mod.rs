@@ -19,13 +19,26 @@ pub struct CellBox<const D: usize> {
     pub high: [u32; D],
 }
 
-/// What a block of cells may reach under one input.
+/// The cells that lie in the successor box of *every* cell of a block under one input.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct BlockReach<const D: usize> {
-    /// Cells that lie in the successor box of *every* cell of the block; `None` if no such cell is known.
-    pub core: Option<CellBox<D>>,
-    /// A box that contains every successor of every cell of the block, clipped to the grid.
-    pub hull: CellBox<D>,
+pub enum BlockCore<const D: usize> {
+    /// Not known.
+    Unknown,
+    /// Part of it leaves the grid, so every pair of the block does.
+    Leaves,
+    /// These cells.
+    Shared(CellBox<D>),
+}
+
+/// Cells on each axis of the boxes that answer for a block.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct BlockExtents<const D: usize> {
+    /// Of [`BlockCore::Shared`], if the blocks have one.
+    pub core: Option<[u32; D]>,
+    /// Of the hull of one input.
+    pub hull: [u32; D],
+    /// Of the hull over all inputs.
+    pub hull_of_all: [u32; D],
 }
 
 /// How the successor boxes of an abstraction vary in size.
@@ -60,25 +73,28 @@ pub trait Abstraction<const D: usize>: Sync {
         None
     }
 
-    /// Cells on each axis of the blocks for which [`Abstraction::block_reach`] answers.
+    /// Cells on each axis of the blocks for which [`Abstraction::block_core`] and the hulls answer.
     fn block(&self) -> [u32; D] {
         [1; D]
     }
 
-    /// What the block that starts at a cell may reach under an input; `None` if every pair of the block leaves the grid.
-    /// The default knows only the grid.
-    fn block_reach(&self, first: [u32; D], input: usize) -> Option<BlockReach<D>> {
+    /// What all successor boxes of the block whose first cell is anchored share under an input.
+    fn block_core(&self, first: &Self::Anchor, input: usize) -> BlockCore<D> {
         let _ = (first, input);
-        let shape = self.shape();
-        let hull = CellBox {
-            low: [0; D],
-            high: shape.count.map(|n| n - 1),
-        };
-        Some(BlockReach { core: None, hull })
+        BlockCore::Unknown
     }
 
-    /// Fixed sizes of core and hull, if [`Abstraction::block_reach`] answers with boxes of one size.
-    fn block_extents(&self) -> Option<(Option<[u32; D]>, [u32; D])> {
+    /// A box that contains every successor of the block under an input, or under all, clipped to the grid; `None` if
+    /// there is none. The default knows only the grid.
+    fn block_hull(&self, first: &Self::Anchor, input: Option<usize>) -> Option<CellBox<D>> {
+        let _ = (first, input);
+        let high = self.shape().count.map(|n| n - 1);
+        Some(CellBox { low: [0; D], high })
+    }
+
+    /// Sizes of the boxes that [`Abstraction::block_core`] and [`Abstraction::block_hull`] answer with, if each has one size
+    /// for all blocks and inputs.
+    fn block_extents(&self) -> Option<BlockExtents<D>> {
         None
     }
 }

@@ -2,13 +2,16 @@
 
 use std::path::PathBuf;
 
-use firmware::table::{Law, TableView};
+use clap::ValueEnum;
+use firmware::table::{InputsKind, Law, TableView};
 use serde::Serialize;
 
 use super::files::write_all;
 use super::synth::SynthReport;
-use super::{Failure, OutputArgs, SpecArgs, output, progress, simulate};
-use crate::pipeline;
+use super::{Failure, OutputArgs, SpecArgs, output, progress, simulate, verify};
+use crate::compress::{LawReport, Options};
+use crate::pipeline::{self, Encoding};
+use crate::report::{self, Findings};
 use crate::simulation::closed_loop::{self, Estimator};
 use crate::simulation::monitor::Summary;
 use crate::simulation::scenario::Scenario;
@@ -25,15 +28,52 @@ pub(super) struct BuildArgs {
     /// Folder for the files; made if it does not exist
     #[arg(long, value_name = "DIR", default_value = "out")]
     out: PathBuf,
+    /// How the laws are stored; dense is large, and there to compare with
+    #[arg(long, value_enum, default_value = "tree")]
+    encoding: EncodingArg,
+    /// Let the tree choose among the fastest inputs only: larger, fewest worst-case steps
+    #[arg(long)]
+    keep_minimal_time: bool,
+    /// Keep every winning cell, whatever the domain's bytes
+    #[arg(long)]
+    exact_domain: bool,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum EncodingArg {
+    /// Trees and affine laws
+    Tree,
+    /// Bit-packed arrays
+    Dense,
+}
+
+impl BuildArgs {
+    fn encoding(&self) -> Encoding {
+        match self.encoding {
+            EncodingArg::Dense => Encoding::Dense,
+            EncodingArg::Tree => Encoding::Tree(Options {
+                keep_minimal_time: self.keep_minimal_time,
+                exact_domain: self.exact_domain,
+            }),
+        }
+    }
 }
 
 #[derive(Debug, Serialize)]
 struct EncodingReport {
     phase: &'static str,
-    encoding: String,
+    encoding: &'static str,
     bytes: u32,
+    domain_bytes: u32,
+    inputs_bytes: u32,
     entries: u32,
     worst_visits: u16,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    domain_cells: Option<usize>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    worst_steps: Option<u16>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    worst_steps_minimal: Option<u16>,
 }
 
 #[derive(Debug, Serialize)]
@@ -43,6 +83,10 @@ struct BuildReport<'r> {
     spec_hash: String,
     table_bytes: usize,
     encodings: Vec<EncodingReport>,
+    /// Whether every claim of the spec is proven from the bytes.
+    verified: bool,
+    /// Proven time from leaving I1 to I2 [s].
+    reach_within_s: Option<f64>,
     simulation: &'r Summary,
     phases: &'r [PhaseSpan],
 }
@@ -53,63 +97,114 @@ pub(super) fn run(args: &BuildArgs) -> Result<(), Failure> {
     progress::catch_interrupts();
     let synthesis = synthesis::synthesise(&spec, &progress::watch)?;
     let synth = SynthReport::new(&spec, &synthesis);
-    let bytes = pipeline::emit(&spec, &synthesis).map_err(Failure::bad)?;
+    let emitted = pipeline::emit(&spec, &synthesis, args.encoding(), &progress::watch)?;
+    let bytes = emitted.bytes;
     let table =
         TableView::parse(&bytes).map_err(|error| Failure::BadInput(format!("{error:?}")))?;
     let run = closed_loop::simulate(&spec, &table, &Scenario::of(&spec), Estimator::FullState)
         .map_err(Failure::bad)?;
-    let report = BuildReport {
+    let verdict = verify::examine(&bytes, &spec)?;
+    let result = BuildReport {
         synth: &synth,
         spec_hash: hex(&spec.hash()),
         table_bytes: bytes.len(),
-        encodings: encodings(&table),
+        encodings: encodings(&table, &emitted.laws),
+        verified: verdict.verified,
+        reach_within_s: verdict.claim("settle").and_then(|claim| claim.bound),
         simulation: &run.summary,
         phases: &run.phases,
     };
-    let json = serde_json::to_string_pretty(&report).map_err(Failure::bad)?;
+    let json = serde_json::to_string_pretty(&result).map_err(Failure::bad)?;
+    let verdict_json = serde_json::to_string_pretty(&verdict).map_err(Failure::bad)?;
+    let findings = Findings {
+        verdict: Some(serde_json::to_value(&verdict).map_err(Failure::bad)?),
+        budget: None,
+    };
+    let page = report::render(&spec, &bytes, &[], &findings, Vec::new()).map_err(Failure::bad)?;
+    // A table that is not proven must not be flashed by mistake for one that is.
+    let table_name = if verdict.verified {
+        "table.bin"
+    } else {
+        "table.unverified.bin"
+    };
     let files = [
-        ("table.bin", bytes.as_slice()),
+        (table_name, bytes.as_slice()),
+        ("verdict.json", verdict_json.as_bytes()),
+        ("report.html", page.html.as_bytes()),
         ("build.json", json.as_bytes()),
     ];
     write_all(&args.out, &files)?;
     if args.output.json {
         output::line(json);
-        return Ok(());
+    } else {
+        synth.print();
+        print_encodings(&result);
+        verify::print(&verdict);
+        simulate::summary(&run.summary);
+        simulate::phases(&run.phases);
+        let names: Vec<&str> = files.iter().map(|(name, _)| *name).collect();
+        output::line(format_args!(
+            "wrote {} to {}",
+            names.join(", "),
+            args.out.display()
+        ));
     }
-    synth.print();
-    print_encodings(&report);
-    simulate::summary(&run.summary);
-    simulate::phases(&run.phases);
-    output::line(format_args!("wrote {}", args.out.display()));
-    Ok(())
+    verify::answer(&verdict)
 }
 
-fn encodings(table: &TableView<'_>) -> Vec<EncodingReport> {
+fn encodings(table: &TableView<'_>, reports: &[(Law, LawReport)]) -> Vec<EncodingReport> {
     let laws = [(Law::C1, "C1"), (Law::C2, "C2"), (Law::Hold, "Hold")];
     laws.into_iter()
         .filter_map(|(law, phase)| {
             let view = table.law(law)?;
             let entry = table.header().laws[law as usize]?;
+            let report = reports.iter().find(|(of, _)| *of == law).map(|(_, r)| r);
             Some(EncodingReport {
                 phase,
-                encoding: format!("{:?}", entry.inputs_kind),
+                encoding: if entry.inputs_kind == InputsKind::Dense as u8 {
+                    "dense"
+                } else {
+                    "tree"
+                },
                 bytes: entry.domain_len + entry.inputs_len,
+                domain_bytes: entry.domain_len,
+                inputs_bytes: entry.inputs_len,
                 entries: view.encoding().entries(),
-                worst_visits: view.encoding().worst_visits(),
+                worst_visits: entry.worst_visits,
+                domain_cells: report.map(|r| r.domain_cells),
+                worst_steps: report.map(|r| r.steps),
+                worst_steps_minimal: report.map(|r| r.steps_minimal),
             })
         })
         .collect()
 }
 
 fn print_encodings(report: &BuildReport<'_>) {
-    let mut table = output::table(&["law", "encoding", "bytes", "entries", "worst visits"]);
+    let mut table = output::table(&[
+        "law",
+        "encoding",
+        "domain bytes",
+        "inputs bytes",
+        "entries",
+        "worst visits",
+        "cells covered",
+        "worst steps (fastest)",
+    ]);
     for row in &report.encodings {
+        let steps = match (row.worst_steps, row.worst_steps_minimal) {
+            (Some(steps), Some(minimal)) => format!("{steps} ({minimal})"),
+            _ => "-".to_owned(),
+        };
         table.add_row(vec![
             row.phase.to_owned(),
-            row.encoding.clone(),
-            output::grouped(row.bytes as usize),
+            row.encoding.to_owned(),
+            output::grouped(row.domain_bytes as usize),
+            output::grouped(row.inputs_bytes as usize),
             output::grouped(row.entries as usize),
             row.worst_visits.to_string(),
+            row.domain_cells
+                .map_or_else(|| "-".to_owned(), output::grouped),
+            steps,
         ]);
     }
     output::line(table);

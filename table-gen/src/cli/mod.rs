@@ -5,8 +5,13 @@
 mod band;
 mod budget;
 mod build;
+mod counterfactual;
+mod falsify;
 mod files;
+mod fleet;
+mod formula;
 mod inspect;
+mod monitor;
 mod monte_carlo;
 mod output;
 mod plot;
@@ -39,12 +44,22 @@ enum Command {
     Synth(synth::SynthArgs),
     /// Run the grid with no response, the baseline droop or the firmware on a table
     Simulate(simulate::SimulateArgs),
+    /// A recorded event with the fleet responding: what the frequency would have been
+    Counterfactual(counterfactual::CounterfactualArgs),
+    /// Run every charger with its own firmware, meter, clock and faults
+    Fleet(fleet::FleetArgs),
     /// One HTML page with the figures of the paper and more, and each figure as .svg and .csv
     Report(report::ReportArgs),
     /// Run the firmware on a recorded frequency
     Replay(replay::ReplayArgs),
     /// Check the bytes of a table against a spec, independently of how they were made
     Verify(verify::VerifyArgs),
+    /// Search for a real trajectory that breaks a table
+    Falsify(falsify::FalsifyArgs),
+    /// A requirement in temporal logic: as games of a spec, or as a monitor of a recorded frequency
+    Formula(formula::FormulaArgs),
+    /// Show a charger's telemetry, live from a serial port or from a recording
+    Monitor(monitor::MonitorArgs),
     /// Bytes by part, visits of a lookup, free flash on a list of microcontrollers
     Budget(budget::BudgetArgs),
     /// What is in a table: header, levels, jumps between neighbours, slices
@@ -117,6 +132,7 @@ impl From<crate::pipeline::PipelineError> for Failure {
     fn from(error: crate::pipeline::PipelineError) -> Self {
         match error {
             crate::pipeline::PipelineError::Synthesis(error) => error.into(),
+            crate::pipeline::PipelineError::Compress(error) => Self::No(error.to_string()),
             other => Self::bad(other),
         }
     }
@@ -127,7 +143,7 @@ impl From<crate::synthesis::SynthesisError> for Failure {
         use crate::game::GameError;
         use crate::synthesis::SynthesisError as E;
         match &error {
-            E::Grid(_) | E::Abstraction(_) => Self::bad(error),
+            E::Delay { .. } | E::Grid(_) | E::Abstraction(_) => Self::bad(error),
             E::Game {
                 error: GameError::EmptyTarget,
                 ..
@@ -153,9 +169,14 @@ pub fn run() -> ExitCode {
         Command::Build(args) => build::run(&args),
         Command::Synth(args) => synth::run(&args),
         Command::Simulate(args) => simulate::run(&args),
+        Command::Counterfactual(args) => counterfactual::run(&args),
+        Command::Fleet(args) => fleet::run(&args),
         Command::Report(args) => report::run(&args),
         Command::Replay(args) => replay::run(&args),
         Command::Verify(args) => verify::run(&args),
+        Command::Falsify(args) => falsify::run(&args),
+        Command::Formula(args) => formula::run(&args),
+        Command::Monitor(args) => monitor::run(&args),
         Command::Budget(args) => budget::run(&args),
         Command::Inspect(args) => inspect::run(&args),
     };

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use firmware::table::TableView;
 use serde::Serialize;
 
-use super::{Failure, OutputArgs, Overrides, output, progress, simulate};
+use super::{Failure, OutputArgs, Overrides, output, plot, progress, simulate};
 use crate::pipeline;
 use crate::replay::{Replay, replay, trace};
 use crate::simulation::trajectory::PhaseSpan;
@@ -32,6 +32,9 @@ pub(super) struct ReplayArgs {
     /// Write time, frequency and participation of every tick as CSV
     #[arg(long, value_name = "FILE")]
     csv: Option<PathBuf>,
+    /// Draw the recorded frequency in the terminal
+    #[arg(long)]
+    plot: bool,
 }
 
 #[derive(Debug, Serialize)]
@@ -51,13 +54,7 @@ struct ReplayReport<'r> {
 /// Runs the command.
 pub(super) fn run(args: &ReplayArgs) -> Result<(), Failure> {
     let spec = args.overrides.load(&args.spec)?;
-    if let Some(longest) = args.fill_gaps
-        && !(longest.is_finite() && longest > 0.0)
-    {
-        return Err(Failure::BadInput(format!(
-            "--fill-gaps = {longest} is out of range: finite, above 0 s"
-        )));
-    }
+    check_gaps(args.fill_gaps)?;
     let trace = trace::read(&args.trace, args.fill_gaps).map_err(Failure::bad)?;
     progress::catch_interrupts();
     let bytes = pipeline::table_bytes(&spec, args.table.as_deref(), &progress::watch)?;
@@ -111,7 +108,25 @@ pub(super) fn run(args: &ReplayArgs) -> Result<(), Failure> {
     ]);
     output::line(rows);
     simulate::phases(&result.phases);
+    if args.plot {
+        let points: Vec<(f64, f64)> = trace
+            .samples
+            .iter()
+            .map(|sample| (sample.time_s, sample.frequency_hz))
+            .collect();
+        output::line(plot::frequency(&points, &simulate::levels_hz(&spec)));
+    }
     Ok(())
+}
+
+/// The option `--fill-gaps` in its range.
+pub(super) fn check_gaps(fill_gaps_s: Option<f64>) -> Result<(), Failure> {
+    match fill_gaps_s {
+        Some(longest) if !(longest.is_finite() && longest > 0.0) => Err(Failure::BadInput(
+            format!("--fill-gaps = {longest} is out of range: finite, above 0 s"),
+        )),
+        _ => Ok(()),
+    }
 }
 
 fn write_csv(path: &std::path::Path, result: &Replay) -> Result<(), Failure> {

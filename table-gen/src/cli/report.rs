@@ -2,16 +2,23 @@
 
 use std::path::PathBuf;
 
+use firmware::table::TableView;
 use serde::Serialize;
 use serde_json::Value;
 
 use super::files::write_all;
 use super::{Failure, OutputArgs, SpecArgs, output, progress};
+use crate::counterfactual::{self, Question};
+use crate::fleet::{self, FleetConfig, INSTANCES_MAX};
 use crate::pipeline;
+use crate::replay;
+use crate::replay::trace::{self, Trace};
+use crate::report::section::Section;
 use crate::report::study::Study;
-use crate::report::{self, Findings, ROBUSTNESS_RUNS};
+use crate::report::{self, Findings, ROBUSTNESS_RUNS, record};
 use crate::simulation::monitor::Summary;
 use crate::simulation::monte_carlo::{RUNS_MAX, Statistics};
+use crate::simulation::scenario::Scenario;
 use crate::spec::Spec;
 
 /// Arguments of `report`.
@@ -33,6 +40,12 @@ pub(super) struct ReportArgs {
     /// Show no other spec
     #[arg(long, conflicts_with = "beside")]
     alone: bool,
+    /// Recorded frequency to replay and to answer what chargers would have changed
+    #[arg(long, value_name = "TRACE.csv")]
+    trace: Option<PathBuf>,
+    /// Show a fleet of so many instances of the firmware
+    #[arg(long, value_name = "N")]
+    fleet: Option<usize>,
     /// Runs of the robustness section
     #[arg(long, value_name = "N", default_value_t = ROBUSTNESS_RUNS)]
     runs: usize,
@@ -61,7 +74,16 @@ pub(super) fn run(args: &ReportArgs) -> Result<(), Failure> {
             args.runs
         )));
     }
+    if let Some(instances) = args.fleet.filter(|n| !(1..=INSTANCES_MAX).contains(n)) {
+        return Err(Failure::BadInput(format!(
+            "--fleet = {instances} is out of range: 1 to {INSTANCES_MAX}"
+        )));
+    }
     let spec = args.spec.load()?;
+    let trace = match &args.trace {
+        Some(path) => Some(trace::read(path, None).map_err(Failure::bad)?),
+        None => None,
+    };
     let mut specs = vec![(spec.clone(), args.table.as_deref())];
     for name in companions(args, &spec) {
         specs.push((args.spec.overrides.load(&name)?, None));
@@ -76,7 +98,16 @@ pub(super) fn run(args: &ReportArgs) -> Result<(), Failure> {
         let bytes = pipeline::table_bytes(spec, *table, &progress::watch)?;
         studies.push(Study::new(spec, &bytes, args.runs).map_err(Failure::bad)?);
     }
-    let rendered = report::render_studies(&studies, &findings, Vec::new()).map_err(Failure::bad)?;
+    let mut more = Vec::new();
+    if let Some(study) = studies.first() {
+        if let Some(instances) = args.fleet {
+            more.push(fleet_section(study, instances)?);
+        }
+        if let Some(trace) = &trace {
+            more.extend(recorded(study, trace)?);
+        }
+    }
+    let rendered = report::render_studies(&studies, &findings, more).map_err(Failure::bad)?;
     let files = rendered.files();
     let named: Vec<(&str, &[u8])> = files
         .iter()
@@ -107,6 +138,38 @@ pub(super) fn run(args: &ReportArgs) -> Result<(), Failure> {
         args.out.display()
     ));
     Ok(())
+}
+
+/// The section of the fleet, on the scenario of the command `fleet`.
+fn fleet_section(study: &Study, instances: usize) -> Result<Section, Failure> {
+    let parsed = TableView::parse(&study.table);
+    let table = parsed.map_err(|error| Failure::BadInput(format!("{error:?}")))?;
+    let config = FleetConfig::sound(instances);
+    let scenario = Scenario {
+        duration_s: fleet::DURATION_S,
+        ..Scenario::of(&study.spec)
+    };
+    let run = fleet::run(&study.spec, &table, &config, &scenario, &|| {
+        !progress::interrupted()
+    });
+    let run = run.ok_or_else(|| Failure::No("interrupted".to_owned()))?;
+    Ok(report::fleet::fleet(&study.spec.name, &config, &run))
+}
+
+/// The sections of a recorded event.
+fn recorded(study: &Study, trace: &Trace) -> Result<Vec<Section>, Failure> {
+    let parsed = TableView::parse(&study.table);
+    let table = parsed.map_err(|error| Failure::BadInput(format!("{error:?}")))?;
+    let replay = replay::replay(&table, trace)
+        .map_err(|error| Failure::BadInput(format!("the observer cannot be made: {error:?}")))?;
+    let question = Question::PAPER;
+    let found = counterfactual::answer(&study.spec, &table, trace, &question);
+    let found = found.map_err(Failure::bad)?;
+    let name = study.spec.name.as_str();
+    Ok(vec![
+        record::replay(name, trace, &replay),
+        record::counterfactual(name, &found),
+    ])
 }
 
 /// Specs shown beside: what was asked for, else the shipped one with the other direction.

@@ -9,11 +9,9 @@ use serde::Serialize;
 use super::band::{Band, PerState};
 use super::{Failure, OutputArgs, SpecArgs, monte_carlo, output, plot, progress};
 use crate::pipeline;
-use crate::plant::GridPlant;
+use crate::report::limits::symbolic_under;
 use crate::simulation::beyond::Disturbances;
 use crate::simulation::beyond::file::ScenarioFile;
-use crate::simulation::beyond::grid::BeyondGrid;
-use crate::simulation::beyond::plant::BeyondPlant;
 use crate::simulation::closed_loop::{ClosedLoop, Estimator};
 use crate::simulation::monitor::Summary;
 use crate::simulation::recorder::History;
@@ -237,18 +235,14 @@ fn symbolic(
     beyond: Option<&Disturbances>,
     estimator: Estimator,
 ) -> Result<Run, Failure> {
-    let mut closed_loop = ClosedLoop::new(spec, table, estimator).map_err(Failure::bad)?;
     let mut history = History::default();
     let summary = match beyond {
-        None => closed_loop.run(scenario, &mut history),
-        Some(disturbances) => {
-            let (grid, seed) = (GridPlant::new(spec), scenario.seed);
-            let plant = BeyondPlant::new(grid, disturbances, scenario.duration_s + 1.0, seed);
-            let (_, parts) = closed_loop.parts(scenario);
-            let mut grid = BeyondGrid::new(plant, parts, scenario.initial);
-            closed_loop.run_on(&mut grid, scenario, &mut history)
+        None => {
+            ClosedLoop::new(spec, table, estimator).map(|mut it| it.run(scenario, &mut history))
         }
+        Some(beyond) => symbolic_under(spec, table, beyond, scenario, estimator, &mut history),
     };
+    let summary = summary.map_err(Failure::bad)?;
     Ok(Run {
         samples: history.samples,
         phases: history.phases,

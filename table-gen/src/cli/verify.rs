@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use super::{Failure, Overrides, output, progress};
+use crate::spec::Spec;
 use crate::verify::{self, Claim, Counterexample, Verdict, VerifyError};
 
 /// Arguments of `verify`.
@@ -31,13 +32,7 @@ pub(super) fn run(args: &VerifyArgs) -> Result<(), Failure> {
         Failure::BadInput(format!("{}: {error}", path.display()))
     };
     let bytes = std::fs::read(&args.table).map_err(|error| fail(&args.table, error))?;
-    let bar = progress::share("verify");
-    let verdict =
-        verify::verify(&bytes, &spec, &|done| bar(done)).map_err(|error| match error {
-            VerifyError::Interrupted => Failure::No(error.to_string()),
-            _ => Failure::bad(error),
-        })?;
-    drop(bar);
+    let verdict = examine(&bytes, &spec)?;
     if let Some(path) = &args.verdict {
         let text = serde_json::to_string_pretty(&verdict).map_err(Failure::bad)?;
         std::fs::write(path, text).map_err(|error| fail(path, error))?;
@@ -47,6 +42,20 @@ pub(super) fn run(args: &VerifyArgs) -> Result<(), Failure> {
     } else {
         print(&verdict);
     }
+    answer(&verdict)
+}
+
+/// Verifies with progress on stderr.
+pub(super) fn examine(bytes: &[u8], spec: &Spec) -> Result<Verdict, Failure> {
+    let bar = progress::share("verify");
+    verify::verify(bytes, spec, &|done| bar(done)).map_err(|error| match error {
+        VerifyError::Interrupted => Failure::No(error.to_string()),
+        _ => Failure::bad(error),
+    })
+}
+
+/// "No" unless every claim holds.
+pub(super) fn answer(verdict: &Verdict) -> Result<(), Failure> {
     if verdict.verified {
         return Ok(());
     }

@@ -2,7 +2,7 @@
 
 use super::bitset::BitSet;
 use super::inclusion::Inclusion;
-use crate::abstraction::{Abstraction, Extents};
+use crate::abstraction::{Abstraction, BlockCore, Extents};
 use crate::grid_shape::GridShape;
 
 /// The grid cut into blocks of the abstraction's shape.
@@ -72,8 +72,8 @@ impl<const D: usize> Blocks<D> {
 /// Inputs of a block that may have changed their answer since the last sweep.
 #[derive(Debug)]
 pub struct Dirty<const D: usize> {
-    /// The cells that did not change, for hulls; `None` when everything is dirty.
-    unchanged: Option<Inclusion<D>>,
+    /// The cells that did not change, for hulls of one input and of all; `None` when everything is dirty.
+    unchanged: Option<[Inclusion<D>; 2]>,
 }
 
 impl<const D: usize> Dirty<D> {
@@ -84,16 +84,19 @@ impl<const D: usize> Dirty<D> {
 
     /// What a sweep changed.
     pub fn after<A: Abstraction<D>>(abstraction: &A, changed: &BitSet) -> Self {
-        let Some((_, hull)) = abstraction.block_extents() else {
+        let Some(extents) = abstraction.block_extents() else {
             return Self::everything();
         };
-        let sizes = Extents {
-            min: hull,
-            max: hull,
+        let unchanged = changed.complement();
+        let of_size = |size| {
+            let sizes = Extents {
+                min: size,
+                max: size,
+            };
+            Inclusion::new(abstraction.shape(), &unchanged, Some(sizes))
         };
-        let unchanged = Inclusion::new(abstraction.shape(), &changed.complement(), Some(sizes));
         Self {
-            unchanged: Some(unchanged),
+            unchanged: Some([of_size(extents.hull), of_size(extents.hull_of_all)]),
         }
     }
 }
@@ -115,36 +118,43 @@ impl<const D: usize> Filter<D> {
         dirty: Dirty<D>,
         need_core: bool,
     ) -> Self {
-        let core = match abstraction.block_extents() {
-            Some((Some(core), _)) if need_core => {
+        let core = abstraction
+            .block_extents()
+            .and_then(|extents| extents.core)
+            .filter(|_| need_core)
+            .map(|core| {
                 let sizes = Extents {
                     min: core,
                     max: core,
                 };
-                Some(Inclusion::new(abstraction.shape(), set, Some(sizes)))
-            }
-            _ => None,
-        };
+                Inclusion::new(abstraction.shape(), set, Some(sizes))
+            });
         Self { dirty, core }
     }
 
     /// Bit mask of the inputs of the block that are worth a look.
     #[inline]
     pub fn inputs<A: Abstraction<D>>(&self, abstraction: &A, first: [u32; D]) -> u32 {
+        let anchor = abstraction.anchor(first);
+        if let Some([_, unchanged_of_all]) = &self.dirty.unchanged {
+            match abstraction.block_hull(&anchor, None) {
+                Some(hull) if !unchanged_of_all.includes(&hull) => {}
+                _ => return 0,
+            }
+        }
         let mut mask = 0;
         for input in 0..abstraction.inputs() {
-            let Some(reach) = abstraction.block_reach(first, input) else {
-                continue;
-            };
-            if let Some(unchanged) = &self.dirty.unchanged
-                && unchanged.includes(&reach.hull)
-            {
-                continue;
+            // The core first: it fails most often.
+            match (&self.core, abstraction.block_core(&anchor, input)) {
+                (_, BlockCore::Leaves) => continue,
+                (Some(set), BlockCore::Shared(core)) if !set.includes(&core) => continue,
+                _ => {}
             }
-            if let (Some(set), Some(core)) = (&self.core, &reach.core)
-                && !set.includes(core)
-            {
-                continue;
+            if let Some([unchanged, _]) = &self.dirty.unchanged {
+                match abstraction.block_hull(&anchor, Some(input)) {
+                    Some(hull) if !unchanged.includes(&hull) => {}
+                    _ => continue,
+                }
             }
             mask |= 1 << input;
         }

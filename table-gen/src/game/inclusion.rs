@@ -74,6 +74,9 @@ impl<const D: usize> Inclusion<D> {
         let mut which = 0;
         for d in 1..D {
             at += cells.low[d] as usize * self.strides[d];
+            if sizes.min[d] == sizes.max[d] {
+                continue;
+            }
             let size = cells.high[d] - cells.low[d] + 1;
             which += (size - sizes.min[d]) as usize * self.factors[d];
         }

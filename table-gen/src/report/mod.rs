@@ -6,6 +6,7 @@
 //! | [`section`], [`figure`] | the page as data |
 //! | [`responses`] | the event, the laws against the baseline, their robustness, Table II |
 //! | [`record`] | the recorded event: replay and counterfactual |
+//! | [`fleet`] | every charger with its own firmware |
 //! | [`limits`] | plants beyond the paper's, and what is outside the proof |
 //! | [`proof`] | verdict, budget, spec and hashes |
 //! | [`palette`], [`chart`] | the drawing |
@@ -13,9 +14,12 @@
 
 pub mod chart;
 pub mod figure;
+pub mod fleet;
+pub mod limits;
 pub mod page;
 pub mod palette;
 pub mod proof;
+pub mod record;
 pub mod responses;
 pub mod section;
 pub mod study;
@@ -122,6 +126,9 @@ pub fn render_studies(
     sections.push(responses::robustness(studies));
     if let Some(first) = studies.first() {
         sections.push(responses::table_two(&first.spec));
+    }
+    for study in studies {
+        sections.push(limits::beyond(study)?);
     }
     sections.extend(more);
     sections.push(proof::verdict(findings.verdict.as_ref()));

@@ -77,31 +77,49 @@ impl Adversary for BangBang {
 }
 
 /// Worst-case search: a linear functional of the state chooses the sign of the power (resonance with the slow
-/// oscillation), the errors push the estimate across cells; the functional is drawn anew for every trajectory.
+/// oscillation), the errors push the estimate across cells at random. The parameters can be drawn and mutated.
 #[derive(Debug, Clone)]
 pub(crate) struct Resonant {
     pub(crate) random: Random,
-    direction: [f64; STATES],
-    level: f64,
+    pub(crate) corner: [f64; STATES],
+    pub(crate) moment: f64,
+    pub(crate) direction: [f64; STATES],
+    pub(crate) level: f64,
 }
 
 impl Resonant {
     pub(crate) fn new(seed: u64) -> Self {
         let mut random = Random::new(seed);
-        let direction = std::array::from_fn(|_| 2.0 * random.unit() - 1.0);
-        let level = 2.0 * random.unit() - 1.0;
         Self {
+            corner: std::array::from_fn(|_| if random.sign() > 0.0 { 1.0 } else { 0.0 }),
+            moment: random.unit(),
+            direction: std::array::from_fn(|_| 2.0 * random.unit() - 1.0),
+            level: 2.0 * random.unit() - 1.0,
             random,
-            direction,
-            level,
         }
+    }
+
+    /// A neighbour: one parameter drawn anew, all others moved a little.
+    pub(crate) fn mutated(&self, seed: u64) -> Self {
+        let mut random = Random::new(seed);
+        let mut out = self.clone();
+        let near = |value: f64, random: &mut Random| value + 0.1 * (2.0 * random.unit() - 1.0);
+        out.direction = out.direction.map(|value| near(value, &mut random));
+        out.level = near(out.level, &mut random);
+        out.moment = near(out.moment, &mut random).clamp(0.0, 0.999);
+        match random.next() % 6 {
+            axis @ 0..=3 => out.corner[axis as usize] = 1.0 - out.corner[axis as usize],
+            4 => out.level = 2.0 * random.unit() - 1.0,
+            _ => out.moment = random.unit(),
+        }
+        out.random = random;
+        out
     }
 }
 
 impl Adversary for Resonant {
     fn event(&mut self) -> ([f64; STATES], f64) {
-        let corner = std::array::from_fn(|_| if self.random.sign() > 0.0 { 1.0 } else { 0.0 });
-        (corner, self.random.unit())
+        (self.corner, self.moment)
     }
 
     fn tick(&mut self, x: &[f64; STATES], _: PhaseState) -> (f64, [f64; STATES]) {

@@ -25,26 +25,26 @@
 //!
 //! Whether I1 and I2 were left or reached is what the firmware measures at its ticks.
 
-mod adversaries;
+pub(crate) mod adversaries;
 mod cellset;
 mod claims;
 mod closed;
 mod event;
 mod header;
 mod longest_path;
-mod model;
+pub(crate) mod model;
 mod path;
 mod regions;
-mod replay;
+pub(crate) mod replay;
 mod segment;
 mod successor;
-mod tally;
+pub(crate) mod tally;
 #[cfg(test)]
 mod tests;
 mod timed;
 mod verdict;
 mod watching;
-mod witness;
+pub(crate) mod witness;
 mod zonotope;
 
 pub use path::ShownStep;

@@ -16,11 +16,11 @@ const MICRO: f64 = firmware::units::MICRO as f64;
 
 /// Interval in which the net power `P u' - w` \[kW\] may vary while a level is held, as centre and radius.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Drive {
+pub(crate) struct Drive {
     /// Centre \[kW\].
-    pub(super) mid: f64,
+    pub(crate) mid: f64,
     /// Largest distance from the centre \[kW\]; 0 if the net power is known exactly.
-    pub(super) radius: f64,
+    pub(crate) radius: f64,
 }
 
 impl Drive {
@@ -34,32 +34,32 @@ impl Drive {
 
 /// Plant, clocks, inputs and bounds of one closed loop.
 #[derive(Debug, Clone)]
-pub(super) struct Model {
+pub(crate) struct Model {
     /// A of `x' = A x + b v`.
-    pub(super) a: Matrix<STATES>,
+    pub(crate) a: Matrix<STATES>,
     /// b of `x' = A x + b v`.
-    pub(super) b: Vector<STATES>,
+    pub(crate) b: Vector<STATES>,
     /// Net power under each level.
-    pub(super) drives: Vec<Drive>,
+    pub(crate) drives: Vec<Drive>,
     /// Bound of the estimate's error \[micro-units\].
-    pub(super) error: [f64; STATES],
+    pub(crate) error: [f64; STATES],
     /// States at the event \[micro-units\].
-    pub(super) initial: [Interval; STATES],
+    pub(crate) initial: [Interval; STATES],
     /// Lowest allowed frequency \[µHz\].
-    pub(super) containment: Option<f64>,
+    pub(crate) containment: Option<f64>,
     /// Length of a tick \[s\].
-    pub(super) tick_s: f64,
+    pub(crate) tick_s: f64,
     /// One tick.
-    pub(super) tick: Segment,
+    pub(crate) tick: Segment,
     /// One period.
-    pub(super) period: Segment,
+    pub(crate) period: Segment,
     /// Ticks of a period.
-    pub(super) period_ticks: u32,
+    pub(crate) period_ticks: u32,
 }
 
 impl Model {
     /// The closed loop of a table's header with a spec's plant and uncertainty.
-    pub(super) fn new(header: &Header, spec: &Spec) -> Self {
+    pub(crate) fn new(header: &Header, spec: &Spec) -> Self {
         let (a, b) = GridPlant::new(spec).matrices();
         let levels = 0..header.levels;
         let drives = levels
@@ -88,7 +88,7 @@ impl Model {
     }
 
     /// The segment over which a decision is held.
-    pub(super) fn held(&self, ticks: u32) -> &Segment {
+    pub(crate) fn held(&self, ticks: u32) -> &Segment {
         if ticks == self.period_ticks {
             &self.period
         } else {
@@ -97,7 +97,7 @@ impl Model {
     }
 
     /// Whether the loop is deterministic but for the moment of the event: no disturbance, no error, one initial state.
-    pub(super) fn is_exact(&self) -> bool {
+    pub(crate) fn is_exact(&self) -> bool {
         self.drives.iter().all(|drive| drive.radius <= 1e-3)
             && self.error == [0.0; STATES]
             && self.initial.iter().all(|axis| axis.high - axis.low <= 1e-3)
@@ -105,7 +105,7 @@ impl Model {
 }
 
 /// A number of the spec in micro-units. Decimal numbers that name whole micro-units become exactly those.
-pub(super) fn micro(value: f64) -> Interval {
+pub(crate) fn micro(value: f64) -> Interval {
     let scaled = value * MICRO;
     if (scaled - scaled.round()).abs() <= 1e-9 * scaled.abs().max(1.0) {
         Interval::point(scaled.round())

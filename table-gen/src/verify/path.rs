@@ -7,18 +7,18 @@ use crate::interval::Interval;
 
 /// One step of a path of sets.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct PathStep {
-    pub(super) tick: u32,
-    pub(super) phase: Phase,
-    pub(super) level: u8,
-    pub(super) cell: Option<[u16; 4]>,
+pub(crate) struct PathStep {
+    pub(crate) tick: u32,
+    pub(crate) phase: Phase,
+    pub(crate) level: u8,
+    pub(crate) cell: Option<[u16; 4]>,
     /// Frequencies of the set \[µHz\].
-    pub(super) set: Interval,
+    pub(crate) set: Interval,
 }
 
 impl PathStep {
     /// The moment of the event.
-    pub(super) fn event(set: Interval) -> Self {
+    pub(crate) fn event(set: Interval) -> Self {
         Self {
             tick: 0,
             phase: Phase::NoControl,
@@ -29,7 +29,7 @@ impl PathStep {
     }
 
     /// For the verdict.
-    pub(super) fn shown(&self, tick_s: f64) -> ShownStep {
+    pub(crate) fn shown(&self, tick_s: f64) -> ShownStep {
         ShownStep {
             time_s: f64::from(self.tick) * tick_s,
             phase: phase_name(self.phase),
@@ -59,7 +59,7 @@ pub struct ShownStep {
 }
 
 /// Name of a phase in verdicts.
-pub(super) fn phase_name(phase: Phase) -> &'static str {
+pub(crate) fn phase_name(phase: Phase) -> &'static str {
     match phase {
         Phase::NoControl => "No control",
         Phase::C1 => "C1",
@@ -72,22 +72,22 @@ pub(super) fn phase_name(phase: Phase) -> &'static str {
 
 /// The steps of all paths of an exploration, as a tree.
 #[derive(Debug, Clone, Default)]
-pub(super) struct Traces {
+pub(crate) struct Traces {
     steps: Vec<(Option<u32>, PathStep)>,
 }
 
 impl Traces {
-    pub(super) fn push(&mut self, parent: Option<u32>, step: PathStep) -> u32 {
+    pub(crate) fn push(&mut self, parent: Option<u32>, step: PathStep) -> u32 {
         self.steps.push((parent, step));
         (self.steps.len() - 1) as u32
     }
 
-    pub(super) fn len(&self) -> usize {
+    pub(crate) fn len(&self) -> usize {
         self.steps.len()
     }
 
     /// The path that ends in a step, from the event on. Watching ticks in which nothing changed are left out.
-    pub(super) fn path(&self, last: u32) -> Vec<PathStep> {
+    pub(crate) fn path(&self, last: u32) -> Vec<PathStep> {
         let mut path: Vec<PathStep> = Vec::new();
         let mut at = Some(last);
         // A parent comes before its child, so this ends.

@@ -47,6 +47,8 @@ pub(crate) struct Breach {
     pub(crate) time_s: f64,
     /// Real frequency \[µHz\].
     pub(crate) f: f64,
+    /// Ticks since the first after the event.
+    pub(crate) tick: u32,
 }
 
 /// The closed loop, prepared for many trajectories.
@@ -77,6 +79,19 @@ impl<'a> Replay<'a> {
             inner,
             settle_ticks,
         }
+    }
+
+    /// How far a sample is from breaking a claim \[µHz\]; not positive where it does.
+    pub(crate) fn margin(&self, sample: &Sample) -> f64 {
+        let f = sample.x[AXIS_F];
+        let contained = self
+            .model
+            .containment
+            .map_or(f64::INFINITY, |limit| f - limit);
+        if sample.phase != Phase::Hold {
+            return contained;
+        }
+        contained.min(f - self.inner[0]).min(self.inner[1] - f)
     }
 
     /// Runs a trajectory for a number of ticks, or until it breaks a claim; `see` is shown every tick.
@@ -117,7 +132,14 @@ impl<'a> Replay<'a> {
                 phase: state.phase,
                 level: state.level,
             });
-            let breach = |kind, f| Some(Breach { kind, time_s, f });
+            let breach = |kind, f| {
+                Some(Breach {
+                    kind,
+                    time_s,
+                    f,
+                    tick,
+                })
+            };
             if step == Step::Outside {
                 return breach(Violation::Uncovered, x[AXIS_F]);
             }

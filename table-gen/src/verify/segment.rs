@@ -21,7 +21,7 @@ const STEP_S_MAX: f64 = 0.01;
 const F: usize = firmware::units::AXIS_F;
 
 /// A set of states of which linear functionals can be bounded.
-pub(super) trait Linear {
+pub(crate) trait Linear {
     /// Range of `row · x` over the set.
     fn range(&self, row: &Vector<STATES>) -> Interval;
     /// Largest magnitude on each axis.
@@ -60,11 +60,11 @@ struct Step {
 
 /// A stretch of time with a held input.
 #[derive(Debug, Clone)]
-pub(super) struct Segment {
+pub(crate) struct Segment {
     /// Φ and Γ over the whole stretch.
-    pub(super) flow: Flow<STATES>,
+    pub(crate) flow: Flow<STATES>,
     /// `∫ |exp(A s) b| ds` over the stretch, rounded up.
-    pub(super) absolute: [f64; STATES],
+    pub(crate) absolute: [f64; STATES],
     steps: Vec<Step>,
     end_phi: Vector<STATES>,
     end_gamma: Interval,
@@ -72,7 +72,7 @@ pub(super) struct Segment {
 
 impl Segment {
     /// The stretch of this length \[s\] of `x' = A x + b v`.
-    pub(super) fn new(a: &Matrix<STATES>, b: &Vector<STATES>, length_s: f64) -> Self {
+    pub(crate) fn new(a: &Matrix<STATES>, b: &Vector<STATES>, length_s: f64) -> Self {
         let count = (length_s / STEP_S_MAX).ceil().max(1.0) as u32;
         // A length that exceeds the exact quotient: the steps then cover the stretch.
         let h = (length_s / f64::from(count)).next_up();
@@ -111,7 +111,7 @@ impl Segment {
     }
 
     /// Bounds of the frequency at all times of the stretch \[µHz\], from every state of a set.
-    pub(super) fn frequency(&self, set: &impl Linear, drive: Drive) -> Interval {
+    pub(crate) fn frequency(&self, set: &impl Linear, drive: Drive) -> Interval {
         let magnitude = set.magnitude();
         let mid = Interval::point(drive.mid);
         let at = |phi: &Vector<STATES>, gamma: Interval| set.range(phi) + gamma * mid;

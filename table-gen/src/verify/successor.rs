@@ -42,7 +42,7 @@ pub(super) fn successor(
 }
 
 /// Index of the half-open cell that holds a number, exactly; `None` outside the grid.
-fn index(grid: &Grid, axis: usize, value: f64) -> Option<u16> {
+pub(super) fn index(grid: &Grid, axis: usize, value: f64) -> Option<u16> {
     let lower = f64::from(grid.lower_edge()[axis]);
     let width = f64::from(grid.width()[axis]);
     let guess = ((value - lower) / width).floor();

@@ -13,7 +13,7 @@ use crate::interval::Interval;
 
 /// Ways in which a claim can fail.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub(super) enum Violation {
+pub(crate) enum Violation {
     /// The frequency may fall below containment.
     Containment,
     /// I2 may not be reached in time, or never.
@@ -30,43 +30,43 @@ pub(super) enum Violation {
 
 /// A violation by sets: what, and the path of sets that leads there.
 #[derive(Debug, Clone)]
-pub(super) struct Found {
-    pub(super) what: String,
-    pub(super) path: Vec<PathStep>,
+pub(crate) struct Found {
+    pub(crate) what: String,
+    pub(crate) path: Vec<PathStep>,
 }
 
 /// Bounds and violations.
 #[derive(Debug, Clone, Default)]
-pub(super) struct Tally {
+pub(crate) struct Tally {
     /// Lowest frequency bound, between samples too \[µHz\].
-    pub(super) lowest: Option<f64>,
+    pub(crate) lowest: Option<f64>,
     /// Highest frequency bound, between samples too \[µHz\].
-    pub(super) highest: Option<f64>,
+    pub(crate) highest: Option<f64>,
     /// Most consecutive periods in C1.
-    pub(super) periods_c1: u32,
+    pub(crate) periods_c1: u32,
     /// Most consecutive periods in C2.
-    pub(super) periods_c2: u32,
+    pub(crate) periods_c2: u32,
     /// Most periods of C1 and C2 together until Hold, where cells were explored.
-    pub(super) periods: u32,
+    pub(crate) periods: u32,
     /// Most ticks from the last tick inside (I1, or I2 after Fixed) to I2.
-    pub(super) settle_ticks: u32,
+    pub(crate) settle_ticks: u32,
     /// Most ticks from the event to the first entry of I2.
-    pub(super) event_ticks: u32,
+    pub(crate) event_ticks: u32,
     /// Lowest and highest frequency while Hold is in force \[µHz\].
-    pub(super) held: Option<Interval>,
+    pub(crate) held: Option<Interval>,
     /// Decisions taken.
-    pub(super) lookups: u64,
+    pub(crate) lookups: u64,
     /// Most visits of a lookup.
-    pub(super) worst_visits: u16,
+    pub(crate) worst_visits: u16,
     /// The first violation of each kind.
-    pub(super) violations: BTreeMap<Violation, Found>,
+    pub(crate) violations: BTreeMap<Violation, Found>,
     /// Why the exploration is not complete.
-    pub(super) limit: Option<String>,
+    pub(crate) limit: Option<String>,
 }
 
 impl Tally {
     /// Notes a violation, unless one of its kind is known.
-    pub(super) fn violate(&mut self, kind: Violation, what: &str, trace: u32, traces: &Traces) {
+    pub(crate) fn violate(&mut self, kind: Violation, what: &str, trace: u32, traces: &Traces) {
         self.violations.entry(kind).or_insert_with(|| Found {
             what: what.to_owned(),
             path: traces.path(trace),
@@ -74,7 +74,7 @@ impl Tally {
     }
 
     /// Notes the frequencies of a segment.
-    pub(super) fn flown(&mut self, model: &Model, range: Interval, trace: u32, traces: &Traces) {
+    pub(crate) fn flown(&mut self, model: &Model, range: Interval, trace: u32, traces: &Traces) {
         self.widen(range);
         if model.containment.is_some_and(|limit| range.low < limit) {
             let what = format!("f may fall to {:.4} Hz", range.low / 1e6);
@@ -83,13 +83,13 @@ impl Tally {
     }
 
     /// Notes frequencies.
-    pub(super) fn widen(&mut self, range: Interval) {
+    pub(crate) fn widen(&mut self, range: Interval) {
         self.lowest = Some(self.lowest.map_or(range.low, |f| f.min(range.low)));
         self.highest = Some(self.highest.map_or(range.high, |f| f.max(range.high)));
     }
 
     /// Notes a decision at a cell: every law that the phase machine may have asked is checked.
-    pub(super) fn looked_up(
+    pub(crate) fn looked_up(
         &mut self,
         table: &TableView<'_>,
         cell: Cell,
@@ -107,17 +107,17 @@ impl Tally {
 }
 
 /// Whether C1 decided although f is in I1 and the table has a law for that: C2 does not cover where C1 hands over.
-pub(super) fn missed_handover(table: &TableView<'_>, phase: Phase, measured: State) -> bool {
+pub(crate) fn missed_handover(table: &TableView<'_>, phase: Phase, measured: State) -> bool {
     phase == Phase::C1 && table.law(Law::C2).is_some() && table.header().outer.contains(measured)
 }
 
 /// Most visits of a lookup of any law at a cell, and whether they exceed the header's bound.
-pub(super) fn visits(table: &TableView<'_>, cell: Cell) -> (u16, bool) {
+pub(crate) fn visits(table: &TableView<'_>, cell: Cell) -> (u16, bool) {
     let (mut worst, mut exceeded) = (0, false);
     for law in Law::ALL {
         let entry = table.header().laws[law as usize];
         if let (Some(view), Some(entry)) = (table.law(law), entry) {
-            let visits = view.encoding().visits(cell);
+            let visits = view.visits(cell);
             worst = worst.max(visits);
             exceeded |= visits > entry.worst_visits;
         }

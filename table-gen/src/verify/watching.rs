@@ -5,13 +5,16 @@
 
 use std::collections::BTreeMap;
 
+use firmware::grid::Cell;
 use firmware::phase::{PhaseState, Step};
 use firmware::table::TableView;
+use firmware::units::State;
 
 use super::event;
 use super::model::Model;
 use super::path::{PathStep, Traces};
 use super::regions::Regions;
+use super::successor::{Cells, index};
 use super::tally::{Tally, Violation};
 use super::zonotope::Zonotope;
 use crate::interval::Interval;
@@ -24,6 +27,9 @@ const ROUND_S: f64 = 60.0;
 const ROUNDS_MAX: u32 = 8;
 /// By how much a box that did not close is widened \[share of its width\].
 const WIDEN: f64 = 0.05;
+
+/// Cells up to which a set is cut cell by cell; past that the box around it is taken, which is cheaper and looser.
+const TIGHT_CELLS_MAX: u64 = 4096;
 
 /// Where No control can end.
 pub(super) struct Watched {
@@ -119,7 +125,7 @@ impl Watching<'_> {
         sets
     }
 
-    /// The cells of the first decision.
+    /// The cells of the first decision: tightly if they are few, else those of the box around the set.
     fn decide(
         &self,
         set: &Zonotope,
@@ -128,30 +134,96 @@ impl Watching<'_> {
         out: &mut Watched,
     ) {
         let grid = &self.table.header().grid;
-        for part in self.regions.by_cell(set) {
-            let cell = grid.quantise(part.representative);
-            let index = cell.and_then(|cell| grid.index(cell));
-            let (next, step) = PhaseState::INITIAL.step(self.table, part.representative);
-            if let (Some(index), Step::Level(_)) = (index, step)
-                && out.seeds.contains_key(&index)
-            {
-                continue;
+        let from = (parent, tick);
+        match self.box_of(set) {
+            Some(cells) if count(&cells) > TIGHT_CELLS_MAX => {
+                each(&cells, |cell| {
+                    let index = grid.index(cell);
+                    if index.is_some_and(|index| out.seeds.contains_key(&index)) {
+                        return;
+                    }
+                    let Some(bounds) = grid.bounds(cell) else {
+                        return;
+                    };
+                    for (state, f) in self.regions.within(&bounds) {
+                        self.seed(state, f, from, tally, out);
+                    }
+                });
             }
-            let at = PathStep {
-                tick,
-                phase: next.phase,
-                level: next.level,
-                cell: cell.map(|cell| cell.0),
-                set: part.set.hull_f(),
-            };
-            let trace = out.traces.push(Some(parent), at);
-            match (index, step) {
-                (Some(index), Step::Level(_)) => {
-                    out.seeds.insert(index, trace);
+            _ => {
+                for part in self.regions.by_cell(set) {
+                    let f = part.set.hull_f();
+                    self.seed(part.representative, f, from, tally, out);
                 }
-                _ => {
-                    let what = "no law has an entry for the state in which No control ends";
-                    tally.violate(Violation::Uncovered, what, trace, &out.traces);
+            }
+        }
+    }
+
+    /// The box of cells in which the measurement may lie; `None` if some lie outside the grid.
+    fn box_of(&self, set: &Zonotope) -> Option<Cells> {
+        let mut cells = Cells {
+            low: [0; STATES],
+            high: [0; STATES],
+        };
+        for d in 0..STATES {
+            let bounds = set.bounds(d);
+            let error = self.model.error[d];
+            let grid = &self.table.header().grid;
+            cells.low[d] = index(grid, d, (bounds.low - error).next_down())?;
+            cells.high[d] = index(grid, d, (bounds.high + error).next_up())?;
+        }
+        Some(cells)
+    }
+
+    /// Notes a cell of the first decision by a measured state in it.
+    fn seed(
+        &self,
+        measured: State,
+        f: Interval,
+        (parent, tick): (u32, u32),
+        tally: &mut Tally,
+        out: &mut Watched,
+    ) {
+        let grid = &self.table.header().grid;
+        let cell = grid.quantise(measured);
+        let index = cell.and_then(|cell| grid.index(cell));
+        let (next, step) = PhaseState::INITIAL.step(self.table, measured);
+        let known = index.is_some_and(|index| out.seeds.contains_key(&index));
+        if next == PhaseState::INITIAL || (known && step != Step::Outside) {
+            return;
+        }
+        let at = PathStep {
+            tick,
+            phase: next.phase,
+            level: next.level,
+            cell: cell.map(|cell| cell.0),
+            set: f,
+        };
+        let trace = out.traces.push(Some(parent), at);
+        match (index, step) {
+            (Some(index), Step::Level(_)) => {
+                out.seeds.insert(index, trace);
+            }
+            _ => {
+                let what = "no law has an entry for the state in which No control ends";
+                tally.violate(Violation::Uncovered, what, trace, &out.traces);
+            }
+        }
+    }
+}
+
+fn count(cells: &Cells) -> u64 {
+    (0..STATES)
+        .map(|d| u64::from(cells.high[d] - cells.low[d]) + 1)
+        .product()
+}
+
+fn each(cells: &Cells, mut call: impl FnMut(Cell)) {
+    for p in cells.low[3]..=cells.high[3] {
+        for l in cells.low[2]..=cells.high[2] {
+            for g in cells.low[1]..=cells.high[1] {
+                for f in cells.low[0]..=cells.high[0] {
+                    call(Cell([f, g, l, p]));
                 }
             }
         }

@@ -16,7 +16,7 @@ const TRIES: u64 = 400;
 const TICKS_MAX: u64 = 3_000_000;
 
 /// A real trajectory that breaks a claim in this way, if one is found.
-pub(super) fn find(
+pub(crate) fn find(
     replay: &Replay<'_>,
     model: &Model,
     kind: Violation,
@@ -104,7 +104,7 @@ fn attempt(
     Some(real_path(breach, &samples, name))
 }
 
-fn real_path(breach: Breach, samples: &[Sample], adversary: &str) -> RealPath {
+pub(crate) fn real_path(breach: Breach, samples: &[Sample], adversary: &str) -> RealPath {
     let changed = |i: usize| {
         let (before, now) = (&samples[i.max(1) - 1], &samples[i]);
         i == 0 || i + 1 == samples.len() || (before.phase, before.level) != (now.phase, now.level)

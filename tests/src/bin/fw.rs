@@ -51,6 +51,9 @@ enum Command {
         /// Table; the shipped one, or one made by hand if none is shipped
         #[arg(long)]
         table: Option<PathBuf>,
+        /// Build the image for Cortex-M0+, where floating point is software
+        #[arg(long)]
+        soft_float: bool,
     },
     /// Measure flash, RAM, stack and instructions, and compare with firmware/expected
     Costs {
@@ -73,7 +76,15 @@ fn main() -> ExitCode {
             scenarios,
             ticks,
             table,
-        } => processor_in_the_loop(scenarios, ticks.max(1), table.as_deref()),
+            soft_float,
+        } => {
+            let target = if soft_float {
+                images::TARGET_M0
+            } else {
+                images::TARGET
+            };
+            processor_in_the_loop(scenarios, ticks.max(1), table.as_deref(), target)
+        }
         Command::Costs { bless } => measure(bless),
     };
     match result {
@@ -93,7 +104,7 @@ fn main() -> ExitCode {
 fn build_images(out: &Path, log: bool) -> Result<(), AnyError> {
     let product = if log { HOLDFAST_LOG } else { HOLDFAST };
     for image in [product, PIL] {
-        let elf = Elf::read(&images::build(image)?)?;
+        let elf = Elf::read(&images::build(image, images::TARGET)?)?;
         println!("{}", image.name);
         for section in elf.sections()? {
             let place = match (section.in_flash, section.in_ram) {
@@ -127,12 +138,20 @@ fn table_bytes(named: Option<&Path>) -> Result<Vec<u8>, AnyError> {
     std::fs::read(path).map_err(|error| format!("{}: {error}", path.display()).into())
 }
 
-fn processor_in_the_loop(scenarios: u64, ticks: u32, table: Option<&Path>) -> Result<(), AnyError> {
+fn processor_in_the_loop(
+    scenarios: u64,
+    ticks: u32,
+    table: Option<&Path>,
+    target: &str,
+) -> Result<(), AnyError> {
     let table = table_bytes(table)?;
-    let image = images::build(PIL)?;
+    let image = images::build(PIL, target)?;
     let mut target = Target::start(&image, &table, false)?;
     let wires = Wires::default();
     let mut host = Session::new(&wires, &table);
+    if let Some(reason) = host.table_error() {
+        return Err(format!("the firmware's reader rejects the table: {reason:?}").into());
+    }
     let mut pair = Pair::new(&mut host, &mut target)?;
     for bidirectional in [false, true] {
         let outcome = closed_loop(&mut pair, &scenario::event(bidirectional))?;
@@ -150,7 +169,7 @@ fn processor_in_the_loop(scenarios: u64, ticks: u32, table: Option<&Path>) -> Re
     }
     let agreed = pair.agreed;
     target.ask(&Request::Stop)?;
-    println!("{agreed} answers, target and host equal to the bit");
+    println!("{agreed} answers, the image and the host equal to the bit");
     Ok(())
 }
 

@@ -119,9 +119,9 @@ impl ScenarioFile {
         Self::parse(&text, name)
     }
 
-    /// Names of the shipped scenarios.
-    pub fn shipped_names() -> impl Iterator<Item = &'static str> {
-        SHIPPED.iter().map(|(name, _)| *name)
+    /// The shipped scenarios, in order.
+    pub fn shipped() -> impl Iterator<Item = Result<Self, ScenarioFileError>> {
+        SHIPPED.iter().map(|(name, text)| Self::parse(text, name))
     }
 
     /// Reads a scenario from text that `origin` names in messages.

@@ -6,7 +6,7 @@
 //!
 //! | module | holds |
 //! |---|---|
-//! | [`file`] | the scenario file |
+//! | [`mod@file`] | the scenario file |
 //! | [`plant`] | the equations |
 //! | [`grid`] | the same in time, for the firmware's loop |
 
@@ -111,7 +111,7 @@ impl Disturbances {
         let inertia: f64 = self.losses.iter().map(|l| l.inertia_gw_s_per_hz).sum();
         if inertia != 0.0 {
             out.push(format!(
-                "{inertia} GW s/Hz of inertia are lost with the infeed"
+                "{inertia:.3} GW s/Hz of inertia are lost with the infeed"
             ));
         }
         let governor = &self.governor;

@@ -17,7 +17,10 @@ use crate::plant::{GridPlant, STATES};
 pub struct BeyondPlant {
     plant: GridPlant,
     governor: Governor,
-    losses: Vec<Loss>,
+    /// Moments of the losses \[s\], in order.
+    jumps_s: Vec<f64>,
+    /// What is lost before the first of them, then after each.
+    lost: Vec<Loss>,
     noise: Noise,
 }
 
@@ -33,32 +36,43 @@ pub struct Drive {
 impl BeyondPlant {
     /// The plant under disturbances that last for at least `duration_s`.
     pub fn new(plant: GridPlant, disturbances: &Disturbances, duration_s: f64, seed: u64) -> Self {
+        let mut lost = vec![Loss {
+            at_s: f64::NEG_INFINITY,
+            power_gw: 0.0,
+            inertia_gw_s_per_hz: 0.0,
+        }];
+        for loss in &disturbances.losses {
+            let before = lost[lost.len() - 1];
+            lost.push(Loss {
+                at_s: loss.at_s,
+                power_gw: before.power_gw + loss.power_gw,
+                inertia_gw_s_per_hz: before.inertia_gw_s_per_hz + loss.inertia_gw_s_per_hz,
+            });
+        }
         Self {
             plant,
             governor: disturbances.governor,
-            losses: disturbances.losses.clone(),
+            jumps_s: disturbances.losses.iter().map(|loss| loss.at_s).collect(),
+            lost,
             noise: Noise::new(&disturbances.demand, duration_s, seed),
         }
     }
 
     /// What drives the plant around a time that is no jump \[s\].
     pub fn drive(&self, time_s: f64) -> Drive {
-        let mut drive = Drive {
-            missing_gw: self.noise.at(time_s),
-            twice_inertia: 2.0 * self.plant.inertia,
-        };
-        for loss in self.losses.iter().take_while(|loss| loss.at_s < time_s) {
-            drive.missing_gw += loss.power_gw;
-            drive.twice_inertia -= 2.0 * loss.inertia_gw_s_per_hz;
+        let lost = self.lost[self.jumps_s.partition_point(|at| *at < time_s)];
+        Drive {
+            missing_gw: self.noise.at(time_s) + lost.power_gw,
+            twice_inertia: 2.0 * (self.plant.inertia - lost.inertia_gw_s_per_hz),
         }
-        drive
     }
 
     /// The first jump after a time, or `limit_s`.
     pub fn next_jump(&self, time_s: f64, limit_s: f64) -> f64 {
         // A jump that rounding puts just before the time has happened.
         let after = time_s + 1e-9;
-        let loss = self.losses.iter().map(|l| l.at_s).find(|at| *at > after);
+        let next = self.jumps_s.partition_point(|at| *at <= after);
+        let loss = self.jumps_s.get(next).copied();
         let noise = (!self.noise.is_silent()).then(|| ((after / HOLD_S).floor() + 1.0) * HOLD_S);
         let next = loss.into_iter().chain(noise);
         next.fold(limit_s, f64::min)

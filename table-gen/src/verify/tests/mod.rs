@@ -36,7 +36,11 @@ pub(super) fn small(more: &[&str]) -> Spec {
 pub(super) fn table(spec: &Spec) -> Vec<u8> {
     let unwatched = |_: &'static str| Box::new(Unwatched) as Box<dyn Watch>;
     let synthesis = synthesis::synthesise(spec, &unwatched).unwrap();
-    pipeline::emit(spec, &synthesis).unwrap()
+    let watch = |_| Box::new(Unwatched) as Box<dyn Watch>;
+    let encoding = pipeline::Encoding::Dense;
+    pipeline::emit(spec, &synthesis, encoding, &watch)
+        .unwrap()
+        .bytes
 }
 
 pub(super) static SMALL_TABLE: LazyLock<Vec<u8>> = LazyLock::new(|| table(&small(&[])));

@@ -1,0 +1,52 @@
+//! `falsify TABLE --spec SPEC`: adversaries against the bytes.
+
+use std::path::PathBuf;
+
+use super::{Failure, OutputArgs, Overrides, output};
+use crate::falsify;
+
+/// Arguments of `falsify`.
+#[derive(Debug, clap::Args)]
+pub(super) struct FalsifyArgs {
+    /// The table to attack
+    #[arg(value_name = "TABLE")]
+    table: PathBuf,
+    /// Name of a shipped spec, or path of a TOML file
+    #[arg(long, value_name = "SPEC")]
+    spec: String,
+    #[command(flatten)]
+    overrides: Overrides,
+    #[command(flatten)]
+    output: OutputArgs,
+    /// Control steps (ticks) to simulate
+    #[arg(long, value_name = "N", default_value_t = 1_000_000)]
+    steps: u64,
+    /// Seed of the search; the same seed gives the same search
+    #[arg(long, value_name = "SEED", default_value_t = 1)]
+    seed: u64,
+}
+
+/// Runs the command.
+pub(super) fn run(args: &FalsifyArgs) -> Result<(), Failure> {
+    let spec = args.overrides.load(&args.spec)?;
+    let bytes = std::fs::read(&args.table)
+        .map_err(|error| Failure::BadInput(format!("{}: {error}", args.table.display())))?;
+    let found = falsify::falsify(&bytes, &spec, args.steps, args.seed).map_err(Failure::bad)?;
+    if args.output.json {
+        output::json(&found)?;
+    } else {
+        output::line(format_args!(
+            "{} control steps in {} trajectories; smallest margin {:.4} Hz",
+            output::grouped(found.steps as usize),
+            output::grouped(found.trajectories as usize),
+            found.smallest_margin_hz
+        ));
+    }
+    match found.violation {
+        None => Ok(()),
+        Some(real) => Err(Failure::No(format!(
+            "{} {:.2} s after the event ({})",
+            real.what, real.breach_s, real.adversary
+        ))),
+    }
+}

@@ -1,0 +1,234 @@
+//! The report: its numbers are those of the runs, it is the same every time, and a browser shows it.
+#![allow(clippy::unwrap_used, reason = "a test that cannot go on fails")]
+
+use std::process::Command;
+use std::sync::OnceLock;
+
+use firmware::table::TableView;
+use serde_json::Value;
+use table_gen::game::{Sweep, Watch};
+use table_gen::pipeline::{self, Encoding};
+use table_gen::report::figure::thin;
+use table_gen::report::study::{BaselineEvent, Study, frequency, steady_states};
+use table_gen::report::{Findings, Rendered, render_studies};
+use table_gen::simulation::closed_loop::{Estimator, simulate};
+use table_gen::simulation::scenario::Scenario;
+use table_gen::simulation::trajectory::Run;
+use table_gen::spec::Spec;
+use table_gen::synthesis;
+
+/// Runs of the robustness section: enough to fill it.
+const RUNS: usize = 20;
+
+struct Quiet;
+
+impl Watch for Quiet {
+    fn sweep(&self, _: &Sweep) -> bool {
+        true
+    }
+}
+
+/// The dense table: the lowest allowed input of each cell, whatever the compression does.
+fn dense(name: &str) -> (Spec, Vec<u8>) {
+    let spec = Spec::load(name, &[]).unwrap();
+    let quiet = |_| Box::new(Quiet) as Box<dyn Watch>;
+    let synthesis = synthesis::synthesise(&spec, &quiet).unwrap();
+    let emitted = pipeline::emit(&spec, &synthesis, Encoding::Dense, &quiet).unwrap();
+    (spec, emitted.bytes)
+}
+
+fn study() -> &'static Study {
+    static STUDY: OnceLock<Study> = OnceLock::new();
+    STUDY.get_or_init(|| {
+        let (spec, bytes) = dense("paper-bi");
+        Study::new(&spec, &bytes, RUNS).unwrap()
+    })
+}
+
+fn rendered() -> Rendered {
+    let verdict = serde_json::json!({"verified": false, "claims": [{"name": "stay <&>", "holds": false, "bound": null}]});
+    let findings = Findings {
+        verdict: Some(verdict),
+        budget: Some(
+            serde_json::json!({"table_bytes": 3108, "parts": [{"part": "header", "bytes": 192}]}),
+        ),
+    };
+    render_studies(std::slice::from_ref(study()), &findings, Vec::new()).unwrap()
+}
+
+#[test]
+fn numbers_are_those_of_simulate() {
+    let study = study();
+    let table = TableView::parse(&study.table).unwrap();
+    let scenario = Scenario::of(&study.spec);
+    let run = simulate(&study.spec, &table, &scenario, Estimator::FullState).unwrap();
+    assert_eq!(run, study.symbolic);
+    let page = rendered().html;
+    let summary = &run.summary;
+    for number in [
+        format!("<td>{:.4}</td>", summary.nadir_hz),
+        format!("<td>{:.4}</td>", summary.final_hz),
+        format!("<td>{:.2}</td>", summary.entered_outer_s.unwrap()),
+        format!("<td>{:.2}</td>", summary.entered_inner_s.unwrap()),
+        format!("<td>{:.3}</td>", summary.max_participation),
+    ] {
+        assert!(page.contains(&number), "{number}");
+    }
+    // What a finding says is text, not markup.
+    assert!(page.contains("stay &lt;&amp;&gt;") && !page.contains("stay <&>"));
+}
+
+#[test]
+fn the_same_study_gives_the_same_files() {
+    assert_eq!(rendered(), rendered());
+    let again = Study::new(&study().spec, &study().table, RUNS).unwrap();
+    let files = render_studies(&[again], &Findings::default(), Vec::new()).unwrap();
+    for (figure, other) in files.figures.iter().zip(rendered().figures) {
+        assert_eq!(*figure, other);
+    }
+}
+
+/// A run at every fifth second: time, frequency, participation.
+fn rows(name: &str, run: &Run) -> String {
+    let participation = |time: f64| {
+        let at = run.samples.partition_point(|s| s.time_s <= time + 1e-9);
+        run.samples[at - 1].participation
+    };
+    let points = thin(frequency(run), 5.0, 120.0);
+    let line = |(time, f): (f64, f64)| {
+        format!("{name} {time:5.1} s {f:.5} Hz {:.4}\n", participation(time))
+    };
+    points.into_iter().map(line).collect()
+}
+
+#[test]
+fn data_of_the_figures_is_as_committed() {
+    let spec = Spec::load("paper-bi", &[]).unwrap();
+    let event = BaselineEvent::new(&spec);
+    let mut text = String::new();
+    text += &rows("none", &event.none);
+    text += &rows("unidirectional", &event.unidirectional);
+    text += &rows("bidirectional", &event.bidirectional);
+    text += &rows("firmware", &study().symbolic);
+    text += &rows("firmware, 10 %", &study().uncertain);
+    for row in steady_states(&spec) {
+        text += &format!(
+            "Table II {:.2} Hz: {:.4} {:.4}\n",
+            row.deadband_hz, row.unidirectional_hz, row.bidirectional_hz
+        );
+    }
+    insta::assert_snapshot!("figures", text);
+}
+
+#[test]
+fn figures_stand_alone() {
+    for figure in rendered().figures {
+        assert!(
+            figure.svg.starts_with("<svg role=\"img\" aria-labelledby="),
+            "{}",
+            figure.id
+        );
+        assert!(figure.svg.contains("<title id=") && figure.svg.contains("<style>"));
+        assert!(!figure.svg.contains("http://") || figure.svg.matches("http://").count() == 1);
+        assert!(figure.csv.lines().count() > 1000, "{}", figure.id);
+        assert!(figure.svg.contains("<polyline"), "{}", figure.id);
+    }
+}
+
+/// Appended to a copy of the page: what the browser made of it, as JSON in the title.
+const PROBE: &str = r#"<script>
+addEventListener('load', () => {
+  const figures = [...document.querySelectorAll('figure svg')].map(svg => {
+    const box = svg.getBoundingClientRect();
+    const curves = [...svg.querySelectorAll('polyline')].map(p => p.getBBox()).filter(b => b.width > 100);
+    return {name: svg.getAttribute('aria-labelledby').split(' ').map(id => document.getElementById(id).textContent),
+            width: box.width, height: box.height, curves: curves.length, texts: svg.querySelectorAll('text').length};
+  });
+  const ink = getComputedStyle(document.querySelector('figure svg text')).fill;
+  document.title = JSON.stringify({figures, ink, overflow: document.documentElement.scrollWidth > innerWidth,
+    tables: document.querySelectorAll('table caption').length, headings: document.querySelectorAll('h2').length});
+});
+</script></body>"#;
+
+/// The page in a browser; `None` where there is none.
+fn probe(page: &str, dark: bool) -> Option<Value> {
+    let chromium = ["chromium", "chromium-browser", "google-chrome"]
+        .into_iter()
+        .find(|name| Command::new(name).arg("--version").output().is_ok())?;
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path().join("report.html");
+    std::fs::write(&path, page.replacen("</body>", PROBE, 1)).unwrap();
+    let scheme = format!("--blink-settings=preferredColorScheme={}", u8::from(!dark));
+    let output = Command::new(chromium)
+        .args([
+            "--headless",
+            "--no-sandbox",
+            "--disable-gpu",
+            "--disable-quic",
+            "--no-first-run",
+            "--disable-background-networking",
+            "--disable-component-update",
+            "--disable-sync",
+            "--enable-logging=stderr",
+            "--window-size=1000,1200",
+            "--dump-dom",
+        ])
+        .arg(scheme)
+        .arg(format!(
+            "--user-data-dir={}",
+            dir.path().join("profile").display()
+        ))
+        .arg(format!("file://{}", path.display()))
+        .output()
+        .unwrap();
+    let log = String::from_utf8_lossy(&output.stderr);
+    let console: Vec<&str> = log
+        .lines()
+        .filter(|line| line.contains("CONSOLE"))
+        .collect();
+    assert!(console.is_empty(), "{console:#?}");
+    let dom = String::from_utf8_lossy(&output.stdout).into_owned();
+    let title = dom.split("<title>").nth(1)?.split("</title>").next()?;
+    let title = title
+        .replace("&lt;", "<")
+        .replace("&gt;", ">")
+        .replace("&amp;", "&");
+    Some(serde_json::from_str(&title).unwrap())
+}
+
+#[test]
+fn a_browser_shows_the_page() {
+    let page = rendered();
+    let Some(light) = probe(&page.html, false) else {
+        eprintln!("SKIPPED: no Chromium on the search path; test-all installs it");
+        return;
+    };
+    let figures = light["figures"].as_array().unwrap();
+    assert_eq!(figures.len(), page.figures.len());
+    for figure in figures {
+        let number = |key: &str| figure[key].as_f64().unwrap();
+        // The page is 1000 px wide and the drawing 960 by 400 in shape.
+        assert!(
+            number("width") > 600.0 && number("height") > 250.0,
+            "{figure}"
+        );
+        assert!(
+            number("curves") >= 1.0 && number("texts") > 10.0,
+            "{figure}"
+        );
+        assert!(
+            figure["name"]
+                .as_array()
+                .unwrap()
+                .iter()
+                .all(|text| text.as_str().unwrap().len() > 5)
+        );
+    }
+    assert_eq!(light["overflow"], false);
+    assert!(light["tables"].as_u64().unwrap() > figures.len() as u64);
+    let dark = probe(&page.html, true).unwrap();
+    assert_ne!(
+        light["ink"], dark["ink"],
+        "the drawing does not follow the colour scheme"
+    );
+}
