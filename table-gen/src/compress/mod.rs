@@ -170,7 +170,7 @@ pub fn compress<'w>(
     watch: &dyn Fn(&'static str) -> Box<dyn Watch + 'w>,
 ) -> Result<CompressedLaws, CompressError> {
     let abstraction = synthesis::abstraction(spec, &synthesis.grid)?;
-    let context = Context {
+    let context = |options| Context {
         spec,
         grid: &synthesis.grid,
         abstraction: &abstraction,
@@ -178,22 +178,19 @@ pub fn compress<'w>(
         watch,
     };
     if spec.table.domain == spec::Domain::Reachable {
-        return context.reachable(synthesis);
+        return context(options).reachable(synthesis);
     }
-    let mut done = Vec::new();
-    let mut covered = Covered::none(abstraction.shape().cells());
-    // Backwards from where the event ends: a law that gives cells up shrinks the target of the one before it.
-    for (law, solved) in [
-        (Law::Hold, synthesis.hold.as_ref()),
-        (Law::C2, synthesis.c2.as_ref()),
-        (Law::C1, Some(&synthesis.c1)),
-    ] {
-        if let Some(solved) = solved {
-            done.push(context.law(law, solved, &mut covered)?);
-        }
+    let given_up = context(options);
+    let laws = given_up.winning(synthesis)?;
+    if options.exact_domain || given_up.covers_the_event(&laws)? {
+        return Ok(laws);
     }
-    done.reverse();
-    Ok(CompressedLaws { laws: done })
+    // A cell that the event itself needs was given up: then every cell is kept.
+    let exact = Options {
+        exact_domain: true,
+        ..*options
+    };
+    context(&exact).winning(synthesis)
 }
 
 /// The whole table of a synthesis, and how its laws came out.
@@ -221,6 +218,35 @@ struct Context<'c, 'w> {
 }
 
 impl<'w> Context<'_, 'w> {
+    /// Laws that cover the winning cells, or all but what the options allow to give up.
+    fn winning(&self, synthesis: &Synthesis) -> Result<CompressedLaws, CompressError> {
+        let mut done = Vec::new();
+        let mut covered = Covered::none(self.abstraction.shape().cells());
+        // Backwards from where the event ends: a law that gives cells up shrinks the target of the one before it.
+        for (law, solved) in [
+            (Law::Hold, synthesis.hold.as_ref()),
+            (Law::C2, synthesis.c2.as_ref()),
+            (Law::C1, Some(&synthesis.c1)),
+        ] {
+            if let Some(solved) = solved {
+                done.push(self.law(law, solved, &mut covered)?);
+            }
+        }
+        done.reverse();
+        Ok(CompressedLaws { laws: done })
+    }
+
+    /// Whether the closed loop from the spec's initial states finds an entry wherever it comes.
+    fn covers_the_event(&self, laws: &CompressedLaws) -> Result<bool, CompressError> {
+        let image = emit::assemble(emit::header(self.spec, *self.grid)?, &laws.encoded())?;
+        let table = TableView::parse(&image).map_err(EmitError::Rejected)?;
+        match reachable::reachable(self.spec, self.abstraction, &table) {
+            Ok(_) => Ok(true),
+            Err(CompressError::LeavesTable { .. }) => Ok(false),
+            Err(error) => Err(error),
+        }
+    }
+
     /// Laws that cover what the closed loop asks for.
     fn reachable(&self, synthesis: &Synthesis) -> Result<CompressedLaws, CompressError> {
         let shape = self.abstraction.shape();
