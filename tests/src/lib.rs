@@ -2,7 +2,7 @@
 //!
 //! | module | what |
 //! |---|---|
-//! | [`reference`] | a slow, obvious game solver: the engine's oracle |
+//! | [`mod@reference`] | a slow, obvious game solver: the engine's oracle |
 //! | [`stand_in`] | a small table made by hand, for tests that need a table but no synthesis |
 //! | [`images`] | the Arm images: building, sections, symbols, BIN and HEX |
 //! | [`pil`] | processor in the loop: QEMU, the lock-step link, scenarios, comparison with the host |

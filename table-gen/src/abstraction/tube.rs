@@ -4,14 +4,14 @@
 //! cell, the error of the estimate and what the drive's variation has added so far. Between two cuts
 //!
 //! - the part driven by the drive's middle is smooth; it leaves the chord by at most `h²/8 max|x''|`, and the chord's
-//!   ends are at the cuts. `x''` is bounded over the whole grid, all inputs and the whole period ([`bend`]);
+//!   ends are at the cuts. `x''` is bounded over the whole grid, all inputs and the whole period (`bend`);
 //! - the cell's and the estimate's part is again the flow of a linear system from a point, covered by the same bound with
 //!   the grid widened by the error;
 //! - the drive's variation adds `r ∫₀ˢ |exp(A t) b| dt`, which only grows: its value at the later cut covers the piece.
 //!
 //! **Rounding.** Coefficients are intervals whose radii are multiplied by the largest value they meet and added to the
 //! radius; sums run in f64 over at most D + 2 terms, each below 2^40, so their rounding is below 2^-10 of a unit,
-//! which [`SUM_SLACK`] covers.
+//! which `SUM_SLACK` covers.
 
 use super::affine::AffineInput;
 use crate::flow::{Flow, absolute_integral, apply, product, tube};

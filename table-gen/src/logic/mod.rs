@@ -6,9 +6,9 @@
 //!
 //! | step | module |
 //! |---|---|
-//! | text to formula | [`parse`] |
+//! | text to formula | [`mod@parse`] |
 //! | formula to text, so that parsing gives the same formula again | [`formula`] |
-//! | formula to the games of a spec, or the sub-formula that no game plays | [`compile`] |
+//! | formula to the games of a spec, or the sub-formula that no game plays | [`mod@compile`] |
 //! | formula on a trace: true or false, and by how much | [`monitor`] |
 //!
 //! # The language

@@ -7,16 +7,16 @@
 //!
 //! | step | module |
 //! |---|---|
-//! | plant, clocks and uncertainty of the closed loop | [`model`] |
-//! | a stretch of time with a held input, and the frequency within it | [`segment`] |
-//! | tight sets of states | [`zonotope`] |
-//! | the states on which the phase machine decides alike | [`regions`] |
-//! | the event at an unknown moment of a tick | [`event`] |
-//! | tables without Hold: tight sets in time, over the horizon | [`timed`] |
-//! | tables with Hold: No control by tight sets, then whole cells for ever | [`watching`], [`closed`] |
-//! | the worst number of periods | [`longest_path`] |
-//! | claims and verdict | [`claims`], [`verdict`] |
-//! | a real trajectory for a claim that fails | [`witness`], [`replay`] |
+//! | plant, clocks and uncertainty of the closed loop | `model` |
+//! | a stretch of time with a held input, and the frequency within it | `segment` |
+//! | tight sets of states | `zonotope` |
+//! | the states on which the phase machine decides alike | `regions` |
+//! | the event at an unknown moment of a tick | `event` |
+//! | tables without Hold: tight sets in time, over the horizon | `timed` |
+//! | tables with Hold: No control by tight sets, then whole cells for ever | `watching`, `closed` |
+//! | the worst number of periods | `longest_path` |
+//! | claims and verdict | `claims`, `verdict` |
+//! | a real trajectory for a claim that fails | `witness`, `replay` |
 //!
 //! # What is claimed
 //! The event finds the grid in a state of `uncertainty.initial` and the firmware in No control, at any moment between
