@@ -31,13 +31,28 @@ pub enum PipelineError {
         error: std::io::Error,
     },
     /// A table file is refused by the firmware's reader.
-    #[error("{path}: not a table for this spec: {error:?}", path = path.display())]
+    #[error("{path}: not a table for this spec: {}", rejection(*error), path = path.display())]
     Rejected {
         /// The file.
         path: PathBuf,
         /// Why.
         error: TableError,
     },
+}
+
+/// Why the firmware refused a table, for people.
+fn rejection(error: TableError) -> String {
+    match error {
+        TableError::ForeignSpec { found, expected } => {
+            let hex = |hash: [u8; 16]| hash.iter().map(|b| format!("{b:02x}")).collect::<String>();
+            format!(
+                "it was made from the spec with hash {}, this one has {}",
+                hex(found),
+                hex(expected)
+            )
+        }
+        other => format!("{other:?}"),
+    }
 }
 
 /// How the laws become bytes.
