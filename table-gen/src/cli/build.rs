@@ -9,6 +9,7 @@ use serde::Serialize;
 use super::files::write_all;
 use super::synth::SynthReport;
 use super::{Failure, OutputArgs, SpecArgs, output, progress, simulate, verify};
+use crate::budget;
 use crate::compress::{LawReport, Options};
 use crate::pipeline::{self, Encoding};
 use crate::report::{self, Findings};
@@ -116,9 +117,11 @@ pub(super) fn run(args: &BuildArgs) -> Result<(), Failure> {
     };
     let json = serde_json::to_string_pretty(&result).map_err(Failure::bad)?;
     let verdict_json = serde_json::to_string_pretty(&verdict).map_err(Failure::bad)?;
+    let budget = serde_json::to_value(budget::budget(&table)).map_err(Failure::bad)?;
+    let budget_json = serde_json::to_string_pretty(&budget).map_err(Failure::bad)?;
     let findings = Findings {
         verdict: Some(serde_json::to_value(&verdict).map_err(Failure::bad)?),
-        budget: None,
+        budget: Some(budget.clone()),
     };
     let page = report::render(&spec, &bytes, &[], &findings, Vec::new()).map_err(Failure::bad)?;
     // A table that is not proven must not be flashed by mistake for one that is.
@@ -130,6 +133,7 @@ pub(super) fn run(args: &BuildArgs) -> Result<(), Failure> {
     let files = [
         (table_name, bytes.as_slice()),
         ("verdict.json", verdict_json.as_bytes()),
+        ("budget.json", budget_json.as_bytes()),
         ("report.html", page.html.as_bytes()),
         ("build.json", json.as_bytes()),
     ];
