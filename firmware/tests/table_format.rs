@@ -22,8 +22,8 @@ const TREE: [u8; 18] = [
     0x0D, 0x42, 0x20, // g, delta 1; leaves 2 and law 0
 ];
 /// Membership: p below 1 is inside if f + g >= 1, all else by the hull (g <= 1).
-const DOMAIN: [u8; 29] = [
-    0x02, 0x01, // two half-spaces, the first is the hull
+const DOMAIN: [u8; 30] = [
+    0x02, 0x01, 0x00, // two half-spaces, the first is the hull; no look-ahead
     0x00, 0x00, 0xFF, 0xFF, 0x00, 0x00, 0x00, 0x00, 0x01, 0x00, 0x00, 0x00, // 1 - g >= 0
     0x01, 0x00, 0x01, 0x00, 0x00, 0x00, 0x00, 0x00, 0xFF, 0xFF, 0xFF, 0xFF, // f + g - 1 >= 0
     0x0F, 0x43, 0x3F, // p, delta 1; leaves: half-space 1, hull
@@ -114,7 +114,7 @@ fn header_bytes_are_as_documented() {
         (0, b"HFDT"),
         (4, &[0xFF, 0xFE]),
         (6, &[1, 0]),
-        (8, &[240, 0, 0, 0]),
+        (8, &[241, 0, 0, 0]),
         (12, b"0123456789abcdef"),
         (28, &[0xFC, 0xFF, 0xFF, 0xFF, 0xFD, 0xFF, 0xFF, 0xFF]),
         (36, &[0, 0, 0, 0, 5, 0, 0, 0]),
@@ -128,16 +128,16 @@ fn header_bytes_are_as_documented() {
         (96, &[0xF0, 0x49, 0x02, 0, 0x20, 0xA1, 0x07, 0]),
         // -5 000 000 is 0xFFB3B4C0.
         (104, &[0xC0, 0xB4, 0xB3, 0xFF]),
-        (136, &[1, 1, 4, 0, 29, 0, 0, 0, 18, 0, 0, 0]),
+        (136, &[1, 1, 4, 0, 30, 0, 0, 0, 18, 0, 0, 0]),
         (148, &[255, 255, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0]),
         (160, &[0, 0, 1, 0, 0, 0, 0, 0, 17, 0, 0, 0]),
         (172, &DOMAIN),
-        (201, &TREE),
+        (202, &TREE),
     ];
     for (at, bytes) in golden {
         assert_eq!(&image[*at..*at + bytes.len()], *bytes, "at {at}");
     }
-    assert_eq!(image.len(), 240);
+    assert_eq!(image.len(), 241);
     let table = TableView::parse(&image).unwrap();
     let mut expected = header();
     expected.laws = table.header().laws;
@@ -226,10 +226,10 @@ fn the_frame_names_what_was_found_and_what_is_supported() {
     };
     assert_eq!(with(6, &[7, 0]), version);
     let length = TableError::WrongLength {
-        found: 240,
-        stated: 241,
+        found: 241,
+        stated: 242,
     };
-    assert_eq!(with(8, &[241]), length);
+    assert_eq!(with(8, &[242]), length);
     assert!(matches!(with(200, &[9]), TableError::BadCrc { .. }));
     let foreign = TableView::parse_for_spec(&image, [0; SPEC_HASH_LEN]).unwrap_err();
     assert_eq!(
@@ -301,31 +301,32 @@ fn blocks_are_refused_for_their_own_reasons() {
             BlockError::UnknownEncoding { found: 9 },
         ),
         ("bytes without a domain", 136, &[0], BlockError::BadShape),
-        ("too many half-spaces", 172, &[62], BlockError::BadShape),
+        ("too many half-spaces", 172, &[57], BlockError::BadShape),
         ("hull larger than the list", 173, &[3], BlockError::BadShape),
+        ("too many look-aheads", 174, &[5], BlockError::BadShape),
         (
             "half-space that overflows",
-            186,
+            187,
             &[0xFF, 0x7F, 0, 0, 0, 0, 0, 0, 0xFF, 0xFF, 0xFF, 0x7F],
             BlockError::Overflow,
         ),
         (
             "half-space that does not exist",
-            199,
+            200,
             &[0x44],
             BlockError::BadLevel,
         ),
-        ("too many laws", 201, &[32], BlockError::BadShape),
+        ("too many laws", 202, &[32], BlockError::BadShape),
         (
             "law that overflows",
-            210,
+            211,
             &[0xFF, 0xFF, 0xFF, 0x7F],
             BlockError::Overflow,
         ),
-        ("level that does not exist", 215, &[4], BlockError::BadLevel),
-        ("law that does not exist", 218, &[33], BlockError::BadLevel),
-        ("delta 0", 214, &[0], BlockError::BadNode),
-        ("left leaf past 63", 217, &[0x80], BlockError::BadNode),
+        ("level that does not exist", 216, &[4], BlockError::BadLevel),
+        ("law that does not exist", 219, &[33], BlockError::BadLevel),
+        ("delta 0", 215, &[0], BlockError::BadNode),
+        ("left leaf past 63", 218, &[0x80], BlockError::BadNode),
         (
             "fewer visits than needed",
             138,
@@ -340,8 +341,8 @@ fn blocks_are_refused_for_their_own_reasons() {
         law: Law::Hold,
         reason,
     };
-    assert_eq!(error(&patched(235, &[0x05])), of_hold(BlockError::BadLevel));
-    assert_eq!(error(&patched(219, &[4])), of_hold(BlockError::BadShape));
+    assert_eq!(error(&patched(236, &[0x05])), of_hold(BlockError::BadLevel));
+    assert_eq!(error(&patched(220, &[4])), of_hold(BlockError::BadShape));
     // A directory that leaves bytes over.
     assert_eq!(
         error(&patched(168, &[16])),
@@ -350,10 +351,92 @@ fn blocks_are_refused_for_their_own_reasons() {
     );
 }
 
+/// One look-ahead: f rises by two cells a step for at most three steps, until it is in 6..=7; g must not pass 2.
+const LOOK_AHEAD: [u8; 72] = [
+    0x00, 0x00, 0x01, // no half-space, no hull, one look-ahead
+    0x04, 0x03, 0x00, 0x00, // four fractional bits, three steps
+    0x06, 0x00, 0x07, 0x00, // ends well in f 6..=7
+    0x01, 0x00, 0x09, 0x00, // f keeps to 1..=9
+    0x10, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00, // f' = f + 2
+    0x00, 0x00, 0x10, 0x00, 0x00, 0x00, 0x00, 0x00, // g' = g
+    0x00, 0x00, 0x00, 0x00, 0x10, 0x00, 0x00, 0x00, // l' = l
+    0x00, 0x00, 0x00, 0x00, 0x00, 0x00, 0x10, 0x00, // p' = p
+    0x20, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00, // near offsets of f, g
+    0x00, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00, // of l, p
+    0x10, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00, // far offsets: g one more a step, l none
+    0x3A, // the look-ahead decides everywhere
+];
+
+#[test]
+fn a_look_ahead_answers_as_drawn() {
+    let mut header = header();
+    header.grid = Grid::new([0; 4], [1; 4], [10, 3, 1, 1]).unwrap();
+    header.laws[0] = Some(LawEntry {
+        domain_kind: DomainKind::Tree as u8,
+        inputs_kind: InputsKind::Tree as u8,
+        worst_visits: 5,
+        domain_len: LOOK_AHEAD.len() as u32,
+        inputs_len: 2,
+    });
+    let image = |part: &[u8], visits: u16| {
+        let mut header = header;
+        if let Some(entry) = &mut header.laws[0] {
+            entry.worst_visits = visits;
+        }
+        let mut image = write_header(&header).to_vec();
+        image.extend(part);
+        // One leaf: level 3 everywhere.
+        image.extend([0, 3]);
+        image.extend([0; CRC_LEN]);
+        seal(&mut image).unwrap();
+        image
+    };
+    let good = image(&LOOK_AHEAD, 5);
+    let table = TableView::parse(&good).unwrap();
+    let at = |f, g| table.lookup(Law::C1, Cell([f, g, 0, 0]));
+    assert_eq!([at(6, 2), at(7, 2)], [Some(3); 2], "there already");
+    assert_eq!(at(5, 1), Some(3), "5 -> 7, g at most 2");
+    assert_eq!(at(4, 2), None, "g at most 3");
+    assert_eq!(at(2, 0), Some(3), "2 -> 4 -> 6");
+    assert_eq!(at(2, 1), None);
+    assert_eq!(at(8, 0), None, "8 -> 10");
+    let law = table.law(Law::C1).unwrap();
+    assert_eq!(
+        law.visits(Cell([2, 0, 0, 0])),
+        4,
+        "one node, two steps, one node"
+    );
+    assert_eq!(law.worst_visits(), 5);
+    assert_eq!(
+        LookAhead::read(LOOK_AHEAD[3..71].first_chunk().unwrap())
+            .unwrap()
+            .write(),
+        LOOK_AHEAD[3..71]
+    );
+    let of_c1 = |reason| TableError::BadBlock {
+        law: Law::C1,
+        reason,
+    };
+    assert_eq!(
+        error(&image(&LOOK_AHEAD, 4)),
+        of_c1(BlockError::TooManyVisits)
+    );
+    for (at, byte, reason) in [
+        (3, 0x10, BlockError::BadShape),
+        (4, 0x00, BlockError::BadShape),
+        (13, 0x0A, BlockError::Overflow),
+        (71, 0x3B, BlockError::BadLevel),
+    ] {
+        let mut part = LOOK_AHEAD;
+        part[at] = byte;
+        assert_eq!(error(&image(&part, 5)), of_c1(reason), "byte {at}");
+    }
+}
+
 /// Bytes of an inputs part as the tree of a law whose domain is everything.
 fn with_tree(tree: &[u8]) -> Vec<u8> {
     let mut header = header();
-    let domain = [0, 0, LEAF_INSIDE];
+    let domain = [0, 0, 0, LEAF_INSIDE];
     header.laws[0] = Some(LawEntry {
         domain_kind: DomainKind::Tree as u8,
         inputs_kind: InputsKind::Tree as u8,

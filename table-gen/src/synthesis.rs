@@ -150,7 +150,7 @@ fn inputs(spec: &Spec) -> Vec<AffineInput<STATES>> {
 }
 
 /// The period \[s\], a whole number of milliseconds.
-fn period_s(spec: &Spec) -> f64 {
+pub fn period_s(spec: &Spec) -> f64 {
     f64::from(spec.sampling.period_ms()) / 1000.0
 }
 

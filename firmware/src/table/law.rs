@@ -92,7 +92,7 @@ impl<'t> LawView<'t> {
     /// Input level at a cell; `None` outside the law's domain, and for a cell of another grid.
     pub fn lookup(&self, cell: Cell) -> Option<u8> {
         let of_grid = cell.0.iter().zip(self.count).all(|(at, count)| *at < count);
-        if !of_grid || !self.domain.contains(cell).0 {
+        if !of_grid || !self.domain.contains(cell, self.count).0 {
             return None;
         }
         match &self.inputs {
@@ -103,7 +103,7 @@ impl<'t> LawView<'t> {
 
     /// Half-spaces, nodes and entries that this lookup visits, both parts.
     pub fn visits(&self, cell: Cell) -> u16 {
-        let (inside, visits) = self.domain.contains(cell);
+        let (inside, visits) = self.domain.contains(cell, self.count);
         if inside {
             visits.saturating_add(self.encoding().visits(cell))
         } else {

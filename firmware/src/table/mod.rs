@@ -12,6 +12,7 @@ mod dense;
 mod domain;
 mod header;
 mod law;
+mod look_ahead;
 mod tree;
 mod tree_node;
 mod write;
@@ -19,13 +20,15 @@ mod write;
 pub use affine::{AFFINE_LEN, AffineFunction, LEVEL_FRACTION_BITS};
 pub use dense::{DENSE_HEADER_LEN, DenseView, bits_per_entry};
 pub use domain::{
-    DomainKind, HALF_SPACES_MAX, LEAF_HALF_SPACE, LEAF_HULL, LEAF_INSIDE, LEAF_OUTSIDE,
+    DomainKind, HALF_SPACES_MAX, LEAF_HALF_SPACE, LEAF_HULL, LEAF_INSIDE, LEAF_LOOK_AHEAD,
+    LEAF_OUTSIDE, LOOK_AHEADS_MAX,
 };
 pub use header::{
     BYTE_ORDER_MARK, CRC_LEN, DIRECTORY_ENTRY_LEN, FORMAT_VERSION, HEADER_LEN, Header, LAWS,
     LEVELS_MAX, Law, LawEntry, MAGIC, PlantParameters, SPEC_HASH_LEN,
 };
 pub use law::{Encoding, InputsKind, LawView};
+pub use look_ahead::{LOOK_AHEAD_LEN, LOOK_AHEAD_SHIFT_MAX, LOOK_AHEAD_STEPS_MAX, LookAhead};
 pub use tree::{AFFINE_LAWS_MAX, LEAF_AFFINE, TREE_DEPTH_MAX, TreeView};
 pub use tree_node::{Children, LEAF_VALUES, NODE_LEN_MAX, Node, SKIP_MAX};
 pub use write::{WriteError, seal, write_header};

@@ -32,10 +32,12 @@ const SUBTREE_LEN_MIN: u32 = 3;
 /// Longest left subtree of a node, in bytes.
 pub const SKIP_MAX: u32 = (1 << 24) - 1;
 
-const FLAG: u8 = 4;
-const DELTA_SHIFT: u32 = 3;
-const DELTA_ESCAPE: u16 = 31;
-const BYTE_ESCAPE: u8 = 255;
+pub(super) const FLAG: u8 = 4;
+pub(super) const DELTA_SHIFT: u32 = 3;
+pub(super) const DELTA_ESCAPE: u16 = 31;
+pub(super) const BYTE_ESCAPE: u8 = 255;
+/// What a one-byte skip has been raised by.
+pub(super) const SHORT_SKIP: u8 = LEAF_VALUES - SUBTREE_LEN_MIN as u8;
 
 /// What hangs below a node.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -4,9 +4,14 @@
 //! inside what was kept, and what it loses there is no longer winning; until the description covers exactly the cells
 //! that the game wins inside it.
 
+use firmware::table::LookAhead;
+
 use super::CompressError;
+use rayon::prelude::*;
+
 use super::facets::{Point, hull, normals, tightened};
-use super::membership::{DomainPart, HalfSpaces, describe};
+use super::look_aheads;
+use super::membership::{DomainPart, Predicates, describe};
 use crate::abstraction::Abstraction;
 use crate::abstraction::affine::AffineAbstraction;
 use crate::game::bitset::BitSet;
@@ -24,7 +29,7 @@ const ROUNDS: u32 = 5;
 /// Positions of each half-space of the hull that a leaf may name.
 const TIGHTENINGS: u32 = 4;
 /// Most nodes on a path of a membership tree: below the bits of the four axes boxes could only be halved.
-const DEPTH_MAX: u32 = 32;
+pub const DEPTH_MAX: u32 = 32;
 
 /// A law's game and where it is asked.
 pub struct Play<'p> {
@@ -62,10 +67,13 @@ impl Play<'_> {
         let safety = self.target.is_none();
         let all = won.winning_set(safety);
         let winning = all.count();
+        if !exact && let Some(domain) = self.by_look_ahead(&all)? {
+            return Ok(domain);
+        }
         let mut solution = self.within(&all)?;
         let mut kept = solution.winning_set(safety);
         // What a shrunken target costs comes off the budget.
-        let spaces = self.half_spaces(&kept);
+        let predicates = self.predicates(&kept);
         let mut round = 0;
         loop {
             let given_up = winning - kept.count();
@@ -77,7 +85,7 @@ impl Play<'_> {
                 ROUNDS.. => 0,
                 _ => budget / 4,
             };
-            let part = self.describe(&kept, &spaces, budget)?;
+            let part = self.describe(&kept, &predicates, budget)?;
             let cells = self.covered(&part);
             if cells == kept {
                 return Ok(Domain {
@@ -97,6 +105,37 @@ impl Play<'_> {
             }
             round += 1;
         }
+    }
+
+    /// A domain that look-aheads alone describe, if there is one: no losing cell is inside, at most the budget is given
+    /// up, and the game inside is won everywhere.
+    fn by_look_ahead(&self, all: &BitSet) -> Result<Option<Domain>, CompressError> {
+        let Some(target) = self.target else {
+            return Ok(None);
+        };
+        for margins in look_aheads::MARGINS {
+            let aheads = look_aheads::choose(self.spec, self.abstraction, target, all, margins);
+            let Some(cells) = look_aheads::covered(self.abstraction, target, all, &aheads) else {
+                continue;
+            };
+            if (all.count() - cells.count()) * GIVE_UP_ONE_IN > all.count() {
+                break;
+            }
+            let solution = self.within(&cells)?;
+            if solution.winning == cells.count() {
+                let predicates = Predicates {
+                    aheads: aheads.iter().map(LookAhead::write).collect(),
+                    ..Predicates::default()
+                };
+                let part = self.describe(&cells, &predicates, 0)?;
+                return Ok(Some(Domain {
+                    cells,
+                    solution,
+                    part,
+                }));
+            }
+        }
+        Ok(None)
     }
 
     /// Plays the game with everything outside `domain` (and the target) lost.
@@ -121,31 +160,34 @@ impl Play<'_> {
     fn describe(
         &self,
         kept: &BitSet,
-        spaces: &HalfSpaces,
+        predicates: &Predicates,
         budget: usize,
     ) -> Result<DomainPart, CompressError> {
         let shape = self.abstraction.shape();
         let cells = (0..shape.cells())
+            .into_par_iter()
             .filter(|index| !self.unasked.contains(*index))
             .map(|index| (shape.cell(index).map(|i| i as u16), kept.contains(index)));
-        describe(cells, spaces, budget as u32, DEPTH_MAX)
+        let count = shape.count.map(|n| n as u16);
+        describe(cells, count, predicates, budget as u32, DEPTH_MAX)
     }
 
     /// Cells that a part covers, without unasked ones.
     fn covered(&self, part: &DomainPart) -> BitSet {
         let shape = self.abstraction.shape();
+        let count = shape.count.map(|n| n as u16);
         let mut cells = BitSet::new(shape.cells());
         for index in 0..shape.cells() {
             let cell = shape.cell(index).map(|i| i as u16);
-            if !self.unasked.contains(index) && part.covers(cell) {
+            if !self.unasked.contains(index) && part.covers(cell, count) {
                 cells.insert(index);
             }
         }
         cells
     }
 
-    /// The hull of a set and tighter versions of its half-spaces.
-    fn half_spaces(&self, kept: &BitSet) -> HalfSpaces {
+    /// The hull of a set, tighter versions of its half-spaces, and look-aheads.
+    fn predicates(&self, kept: &BitSet) -> Predicates {
         let shape = self.abstraction.shape();
         let strides = shape.strides();
         let point = |index: usize| -> Point { shape.cell(index).map(|i| i as i32) };
@@ -169,10 +211,18 @@ impl Play<'_> {
                 spaces.extend(tightened(space, TIGHTENINGS).nth(share as usize));
             }
         }
-        spaces.truncate(HalfSpaces::MAX);
-        HalfSpaces {
+        spaces.truncate(Predicates::SPACES_MAX);
+        let aheads = match self.target {
+            Some(target) => {
+                let [margins, ..] = look_aheads::MARGINS;
+                look_aheads::choose(self.spec, self.abstraction, target, kept, margins)
+            }
+            None => Vec::new(),
+        };
+        Predicates {
             spaces,
             hull: hull.len(),
+            aheads: aheads.iter().map(LookAhead::write).collect(),
         }
     }
 }

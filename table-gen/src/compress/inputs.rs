@@ -42,6 +42,8 @@ pub struct InputsTask<'t> {
     pub target: Option<&'t BitSet>,
     /// Cells to answer for.
     pub domain: &'t BitSet,
+    /// Other cells of the game, where another law decides, and what it decides there.
+    pub others: Option<(&'t BitSet, &'t Chosen<'t, STATES>)>,
     /// Forbids inputs of the game.
     pub guard: &'t OptionalGuard,
     /// Told of every sweep of a game.
@@ -110,14 +112,23 @@ impl InputsTask<'_> {
         chosen: &Chosen<'_, STATES>,
         last_resort: bool,
     ) -> Result<Solution, GameError> {
+        let mut everywhere = self.domain.clone();
+        if let Some((others, _)) = self.others {
+            everywhere.add(others);
+        }
         let game = Restricted {
             abstraction: self.abstraction,
             target,
-            domain: self.domain,
+            domain: &everywhere,
+            settled: self.others.map(|(cells, _)| cells),
             guard: self.guard,
             watch: self.watch,
         };
-        game.reach(chosen, last_resort)
+        let decided = |index: usize, cell: [u32; STATES]| match self.others {
+            Some((cells, choice)) if cells.contains(index) => choice(index, cell),
+            _ => chosen(index, cell),
+        };
+        game.reach(&decided, last_resort)
     }
 
     /// Cells of the domain with their allowed inputs.
@@ -131,7 +142,12 @@ impl InputsTask<'_> {
     }
 
     pub(super) fn worst_rank(&self, solution: &Solution) -> u16 {
-        let ranks = self.domain.iter().map(|index| solution.ranks[index]);
+        let others = self.others.iter().flat_map(|(cells, _)| cells.iter());
+        let ranks = self
+            .domain
+            .iter()
+            .chain(others)
+            .map(|index| solution.ranks[index]);
         ranks.filter(|rank| *rank != NOT_WON).max().unwrap_or(0)
     }
 

@@ -1,4 +1,5 @@
-//! The domain of a law as bytes: a tree whose leaves are outside, inside or half-spaces, exact or with cells given up.
+//! The domain of a law as bytes: a tree whose leaves are outside, inside, half-spaces or look-aheads, exact or with cells
+//! given up.
 //!
 //! No losing cell may be inside, ever. Winning cells may be given up: the tree is grown until it is exact, then pruned
 //! from below, with a price in bytes on each cell given up. The lowest price that stays within the budget is found by
@@ -7,8 +8,10 @@
 use firmware::grid::Cell;
 use firmware::table::{
     AffineFunction, DomainKind, HALF_SPACES_MAX, LEAF_HALF_SPACE, LEAF_HULL, LEAF_INSIDE,
-    LEAF_OUTSIDE,
+    LEAF_LOOK_AHEAD, LEAF_OUTSIDE, LOOK_AHEAD_LEN, LOOK_AHEADS_MAX, LookAhead,
 };
+
+use rayon::prelude::*;
 
 use super::CompressError;
 use super::cells::LabelledCell;
@@ -27,7 +30,7 @@ const PRICE_MAX: f64 = 64.0;
 const PRICE_EXACT: f64 = 1e12;
 /// Cells from which on the two sides of a plane are grown in parallel.
 const PARALLEL_CELLS: usize = 2_000;
-/// Marks a winning cell in its labels; not a leaf value, as only 0..=63 less this one are used.
+/// Marks a winning cell in its labels: the one value between look-aheads and hull that no leaf has.
 const WINNING: u64 = 1 << (LEAF_HULL - 1);
 
 /// A domain part.
@@ -37,29 +40,33 @@ pub struct DomainPart {
     pub kind: DomainKind,
     /// The bytes.
     pub bytes: Vec<u8>,
-    /// Most half-spaces and nodes that a question visits.
+    /// Most nodes, half-spaces and steps that a question visits.
     pub worst_visits: u16,
-    /// The tree and its half-spaces.
-    pub spaces: HalfSpaces,
+    /// What the tree's leaves may name.
+    pub predicates: Predicates,
     /// The tree.
     pub tree: Tree,
 }
 
-/// Half-spaces that a membership tree may name.
+/// Half-spaces and look-aheads that a membership tree may name.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
-pub struct HalfSpaces {
-    /// All of them; leaf 2 + k names the k-th.
+pub struct Predicates {
+    /// Half-spaces; leaf 2 + k names the k-th.
     pub spaces: Vec<AffineFunction>,
     /// The first of them are the hull.
     pub hull: usize,
+    /// Look-aheads as bytes; leaf 58 + k names the k-th.
+    pub aheads: Vec<[u8; LOOK_AHEAD_LEN]>,
 }
 
-impl HalfSpaces {
-    /// Most half-spaces besides the mark of a winning cell.
-    pub const MAX: usize = HALF_SPACES_MAX as usize - 1;
+impl Predicates {
+    /// Most half-spaces.
+    pub const SPACES_MAX: usize = HALF_SPACES_MAX as usize;
+    /// Most look-aheads.
+    pub const AHEADS_MAX: usize = LOOK_AHEADS_MAX as usize;
 
-    /// Leaf values that are right for a cell.
-    fn labels(&self, cell: [u16; STATES], winning: bool) -> u64 {
+    /// Leaf values that say "inside" of a cell.
+    fn inside(&self, cell: [u16; STATES], count: [u16; STATES]) -> u64 {
         let mut inside = 1u64 << LEAF_INSIDE;
         let mut hull = self.hull > 0;
         for (k, space) in self.spaces.iter().enumerate() {
@@ -67,19 +74,36 @@ impl HalfSpaces {
             hull &= within || k >= self.hull;
             inside |= u64::from(within) << (usize::from(LEAF_HALF_SPACE) + k);
         }
-        inside |= u64::from(hull) << LEAF_HULL;
-        if winning {
-            inside | WINNING
-        } else {
-            let named = (1u64 << self.spaces.len()) - 1;
-            let all = 3 | named << LEAF_HALF_SPACE | u64::from(self.hull > 0) << LEAF_HULL;
-            all & !inside
+        for (k, ahead) in self.aheads.iter().enumerate() {
+            let within = LookAhead::covers(ahead, Cell(cell), count);
+            inside |= u64::from(within) << (usize::from(LEAF_LOOK_AHEAD) + k);
         }
+        inside | u64::from(hull) << LEAF_HULL
     }
 
-    /// Whether a leaf value covers a cell.
-    fn covers(&self, leaf: u8, cell: [u16; STATES]) -> bool {
-        self.labels(cell, true) >> leaf & 1 == 1 && leaf != LEAF_OUTSIDE
+    /// Leaf values that are right for a cell.
+    fn labels(&self, cell: [u16; STATES], count: [u16; STATES], winning: bool) -> u64 {
+        let inside = self.inside(cell, count);
+        if winning {
+            return inside | WINNING;
+        }
+        let named = |n: usize, first: u8| ((1u64 << n) - 1) << first;
+        let all = 3
+            | named(self.spaces.len(), LEAF_HALF_SPACE)
+            | named(self.aheads.len(), LEAF_LOOK_AHEAD)
+            | named(usize::from(self.hull > 0), LEAF_HULL);
+        all & !inside
+    }
+
+    /// Steps of the longest look-ahead, or half-spaces of the longest question if those are more.
+    fn worst_visits(&self) -> u16 {
+        let steps = self
+            .aheads
+            .iter()
+            .map(|[_, steps, ..]| u16::from(*steps))
+            .max();
+        let spaces = self.hull.max(usize::from(!self.spaces.is_empty())) as u16;
+        spaces.max(steps.unwrap_or(0))
     }
 }
 
@@ -160,21 +184,22 @@ fn prune(grown: &Grown, price: f64) -> (f64, u32, Tree) {
     (left_cost + right_cost, left_missed + right_missed, tree)
 }
 
-/// Describes the winning among some cells of the grid; cells that are not listed may come out either way. At most
-/// `budget` winning cells are given up.
+/// Describes the winning among some cells of a grid with `count` cells; cells that are not listed may come out either way.
+/// At most `budget` winning cells are given up.
 ///
 /// # Errors
 /// A tree that the format cannot hold.
 pub fn describe(
-    cells: impl Iterator<Item = ([u16; STATES], bool)>,
-    spaces: &HalfSpaces,
+    cells: impl ParallelIterator<Item = ([u16; STATES], bool)>,
+    count: [u16; STATES],
+    predicates: &Predicates,
     budget: u32,
     depth_max: u32,
 ) -> Result<DomainPart, CompressError> {
     let mut labelled: Vec<LabelledCell> = cells
         .map(|(cell, winning)| LabelledCell {
             cell,
-            labels: spaces.labels(cell, winning),
+            labels: predicates.labels(cell, count, winning),
         })
         .collect();
     let grown = grow(&mut labelled, depth_max);
@@ -195,23 +220,28 @@ pub fn describe(
         }
     }
     debug_assert!(missed <= budget);
-    let (spaces, tree) = used(spaces, &best);
-    DomainPart::new(spaces, tree)
+    let (predicates, tree) = used(predicates, &best);
+    DomainPart::new(predicates, tree)
 }
 
 impl DomainPart {
-    fn new(spaces: HalfSpaces, tree: Tree) -> Result<Self, CompressError> {
-        let mut bytes = vec![spaces.spaces.len() as u8, spaces.hull as u8];
-        for space in &spaces.spaces {
+    fn new(predicates: Predicates, tree: Tree) -> Result<Self, CompressError> {
+        let Predicates {
+            spaces,
+            hull,
+            aheads,
+        } = &predicates;
+        let mut bytes = vec![spaces.len() as u8, *hull as u8, aheads.len() as u8];
+        for space in spaces {
             bytes.extend(space.write());
         }
+        bytes.extend(aheads.as_flattened());
         bytes.extend(encode_nodes(&tree)?);
-        let asked = spaces.hull.max(usize::from(!spaces.spaces.is_empty()));
         Ok(Self {
             kind: DomainKind::Tree,
             bytes,
-            worst_visits: tree.depth() + asked as u16,
-            spaces,
+            worst_visits: tree.depth() + predicates.worst_visits(),
+            predicates,
             tree,
         })
     }
@@ -251,29 +281,40 @@ impl DomainPart {
                 };
             }
         }
-        *self = Self::new(self.spaces.clone(), tree)?;
+        *self = Self::new(self.predicates.clone(), tree)?;
         Ok(())
     }
 
-    /// Whether the part covers a cell of the grid.
-    pub fn covers(&self, cell: [u16; STATES]) -> bool {
-        self.spaces.covers(self.tree.leaf(Cell(cell)), cell)
+    /// Whether the part covers a cell of the grid with `count` cells.
+    pub fn covers(&self, cell: [u16; STATES], count: [u16; STATES]) -> bool {
+        match self.tree.leaf(Cell(cell)) {
+            LEAF_OUTSIDE => false,
+            leaf => self.predicates.inside(cell, count) >> leaf & 1 == 1,
+        }
     }
 }
 
-/// Drops the half-spaces that a tree does not name, and renumbers its leaves.
-fn used(spaces: &HalfSpaces, tree: &Tree) -> (HalfSpaces, Tree) {
+/// Drops the predicates that a tree does not name, and renumbers its leaves.
+fn used(predicates: &Predicates, tree: &Tree) -> (Predicates, Tree) {
     let named = tree.values();
-    let hull_named = named >> LEAF_HULL & 1 == 1;
-    let mut kept = HalfSpaces::default();
+    let is_named = |leaf: usize| named >> leaf & 1 == 1;
+    let hull_named = is_named(LEAF_HULL.into());
+    let mut kept = Predicates::default();
     let mut to: [u8; 64] = std::array::from_fn(|value| value as u8);
-    for (k, space) in spaces.spaces.iter().enumerate() {
+    for (k, space) in predicates.spaces.iter().enumerate() {
         let leaf = usize::from(LEAF_HALF_SPACE) + k;
-        let in_hull = hull_named && k < spaces.hull;
-        if in_hull || named >> leaf & 1 == 1 {
+        let in_hull = hull_named && k < predicates.hull;
+        if in_hull || is_named(leaf) {
             to[leaf] = LEAF_HALF_SPACE + kept.spaces.len() as u8;
             kept.spaces.push(*space);
             kept.hull += usize::from(in_hull);
+        }
+    }
+    for (k, ahead) in predicates.aheads.iter().enumerate() {
+        let leaf = usize::from(LEAF_LOOK_AHEAD) + k;
+        if is_named(leaf) {
+            to[leaf] = LEAF_LOOK_AHEAD + kept.aheads.len() as u8;
+            kept.aheads.push(*ahead);
         }
     }
     (kept, tree.renumbered(&to))

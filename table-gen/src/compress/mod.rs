@@ -8,13 +8,16 @@
 //! | [`split`], [`tree`] | a small k-d tree over them |
 //! | [`inputs`] | the whole of it for a law: laws, ranks, tree, ranks by the tree, … |
 //! | [`facets`] | half-spaces that bound a winning set |
+//! | [`look_aheads`] | what a held input would do, in integers |
 //! | [`membership`] | a set of cells as a tree with half-spaces, exact or with cells given up |
 //! | [`domain`] | the domain of a law, in which its game is won again |
 //! | [`encode`] | trees as bytes |
+//! | `winning`, `asked` | the laws of a table: every winning cell, or what the closed loop asks for |
 //! | [`recheck`] | the emitted bytes, played again |
 //!
 //! A law's table part is sound by itself: every input that it gives inside its domain is one that the game allows there.
 
+mod asked;
 pub mod cells;
 pub mod deadbeat;
 pub mod domain;
@@ -22,37 +25,32 @@ pub mod encode;
 pub mod facets;
 pub mod inputs;
 pub mod law_set;
+pub mod look_aheads;
 pub mod membership;
 pub mod narrow;
 pub mod reachable;
 pub mod recheck;
 pub mod split;
 pub mod tree;
+mod winning;
 
 use firmware::grid::Grid;
 use firmware::table::{InputsKind, LAWS, Law, LawEntry, TableView};
 
-use crate::abstraction::Abstraction;
 use crate::abstraction::affine::{AbstractionError, AffineAbstraction};
 use crate::emit::{self, EmitError, EncodedLaw};
 use crate::game::bitset::BitSet;
-use crate::game::inclusion::Inclusion;
 use crate::game::{GameError, NOT_WON, Watch};
 use crate::plant::STATES;
 use crate::spec::{self, Spec};
 use crate::synthesis::{self, OptionalGuard, SolvedLaw, Synthesis};
-use domain::Play;
-use inputs::{CompressedInputs, InputsTask};
+use inputs::CompressedInputs;
 use membership::DomainPart;
-use narrow::Controller;
 
 /// Most nodes that a path of a law's inputs tree may have.
 pub const INPUTS_DEPTH_MAX: u32 = 32;
 /// Rounds of ranking by the tree's own choices.
 pub const ROUNDS: u32 = 8;
-
-/// Times that a reachable table is explored again and narrowed.
-const NARROWINGS: u32 = 4;
 
 /// How to compress.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -81,7 +79,8 @@ pub struct CompressedLaw {
 pub struct LawReport {
     /// Cells that the game won, target not counted.
     pub winning_cells: usize,
-    /// Cells of the domain.
+    /// Cells from which the table leads to the law's target: those of its domain, and for a C2 that is asked in I1 alone
+    /// those of C1.
     pub domain_cells: usize,
     /// Leaves of the membership tree.
     pub domain_leaves: u32,
@@ -218,24 +217,6 @@ struct Context<'c, 'w> {
 }
 
 impl<'w> Context<'_, 'w> {
-    /// Laws that cover the winning cells, or all but what the options allow to give up.
-    fn winning(&self, synthesis: &Synthesis) -> Result<CompressedLaws, CompressError> {
-        let mut done = Vec::new();
-        let mut covered = Covered::none(self.abstraction.shape().cells());
-        // Backwards from where the event ends: a law that gives cells up shrinks the target of the one before it.
-        for (law, solved) in [
-            (Law::Hold, synthesis.hold.as_ref()),
-            (Law::C2, synthesis.c2.as_ref()),
-            (Law::C1, Some(&synthesis.c1)),
-        ] {
-            if let Some(solved) = solved {
-                done.push(self.law(law, solved, &mut covered)?);
-            }
-        }
-        done.reverse();
-        Ok(CompressedLaws { laws: done })
-    }
-
     /// Whether the closed loop from the spec's initial states finds an entry wherever it comes.
     fn covers_the_event(&self, laws: &CompressedLaws) -> Result<bool, CompressError> {
         let image = emit::assemble(emit::header(self.spec, *self.grid)?, &laws.encoded())?;
@@ -245,91 +226,6 @@ impl<'w> Context<'_, 'w> {
             Err(CompressError::LeavesTable { .. }) => Ok(false),
             Err(error) => Err(error),
         }
-    }
-
-    /// Laws that cover what the closed loop asks for.
-    fn reachable(&self, synthesis: &Synthesis) -> Result<CompressedLaws, CompressError> {
-        let shape = self.abstraction.shape();
-        let laws = [
-            (Law::C1, Some(&synthesis.c1)),
-            (Law::C2, synthesis.c2.as_ref()),
-            (Law::Hold, synthesis.hold.as_ref()),
-        ];
-        let mut controllers = Vec::new();
-        for (law, solved) in laws {
-            let Some(solved) = solved else { continue };
-            let domain = solved.solution.winning_set(law == Law::Hold);
-            let target = (law != Law::Hold).then(|| target(&solved.solution.ranks));
-            let guard = self.guard(law);
-            let watch = self.watch(law);
-            let candidates = deadbeat::candidates(self.spec, shape, self.band(law));
-            let task = InputsTask {
-                abstraction: self.abstraction,
-                target: target.as_ref(),
-                domain: &domain,
-                guard: &guard,
-                watch: watch.as_ref(),
-                solution: &solved.solution,
-                candidates: &candidates,
-                depth_max: INPUTS_DEPTH_MAX,
-                rounds: self.rounds(),
-            };
-            let controller = Controller::new(law, &task, &candidates)?;
-            controllers.push((controller, solved, target));
-        }
-        let mut dense = [None, None, None];
-        for (controller, ..) in &controllers {
-            dense[controller.law as usize] = Some(controller.dense(self.abstraction));
-        }
-        let image = emit::assemble(emit::header(self.spec, *self.grid)?, &dense)?;
-        drop(dense);
-        let table = TableView::parse(&image).map_err(EmitError::Rejected)?;
-        let mut asked = reachable::reachable(self.spec, self.abstraction, &table)?;
-        let mut best = self.narrow(&controllers, &asked)?;
-        // The small controller, which keeps within the explored cells, may ask for fewer of them.
-        for _ in 0..NARROWINGS {
-            if !asked.closed {
-                break;
-            }
-            let image = emit::assemble(emit::header(self.spec, *self.grid)?, &best.encoded())?;
-            let table = TableView::parse(&image).map_err(EmitError::Rejected)?;
-            asked = reachable::reachable(self.spec, self.abstraction, &table)?;
-            let next = self.narrow(&controllers, &asked)?;
-            if next.part_bytes() >= best.part_bytes() {
-                break;
-            }
-            best = next;
-        }
-        Ok(best)
-    }
-
-    /// The laws for what is asked for.
-    fn narrow(
-        &self,
-        controllers: &[(Controller, &SolvedLaw, Option<BitSet>)],
-        asked: &reachable::Asked,
-    ) -> Result<CompressedLaws, CompressError> {
-        let closed = asked.closed.then(|| {
-            let mut union = asked.laws[0].clone();
-            union.add(&asked.laws[1]);
-            union.add(&asked.laws[2]);
-            Inclusion::new(self.abstraction.shape(), &union, self.abstraction.extents())
-        });
-        let mut laws = Vec::new();
-        for (controller, solved, target) in controllers {
-            let asked = &asked.laws[controller.law as usize];
-            let (inputs, part) =
-                controller.narrow(self.abstraction, asked, closed.as_ref(), INPUTS_DEPTH_MAX)?;
-            laws.push(finish(
-                controller.law,
-                solved,
-                target.clone(),
-                asked,
-                inputs,
-                part,
-            ));
-        }
-        Ok(CompressedLaws { laws })
     }
 
     fn guard(&self, law: Law) -> OptionalGuard {
@@ -362,72 +258,6 @@ impl<'w> Context<'_, 'w> {
             ROUNDS
         }
     }
-
-    fn law(
-        &self,
-        law: Law,
-        solved: &SolvedLaw,
-        covered: &mut Covered,
-    ) -> Result<CompressedLaw, CompressError> {
-        let guard = self.guard(law);
-        let watch = self.watch(law);
-        let stay = self.spec.requirements.stay;
-        let target = (law != Law::Hold).then(|| {
-            let mut target = target(&solved.solution.ranks);
-            if stay {
-                target.keep(&covered.cells);
-            }
-            target
-        });
-        // Cells that no decision brings to this law: an earlier one answers there, or f is in I2 and Fixed does.
-        let mut unasked = covered.cells.clone();
-        if !stay
-            && let Some(target) = &target
-            && law == Law::C2
-        {
-            unasked.add(target);
-        }
-        if let Some(target) = &target {
-            unasked.keep(target);
-        }
-        let play = Play {
-            spec: self.spec,
-            abstraction: self.abstraction,
-            guard: &guard,
-            watch: watch.as_ref(),
-            target: target.as_ref(),
-            unasked: &unasked,
-        };
-        let domain = play.domain(&solved.solution, self.options.exact_domain)?;
-        let candidates = deadbeat::candidates(self.spec, self.abstraction.shape(), self.band(law));
-        let inputs = InputsTask {
-            abstraction: self.abstraction,
-            target: target.as_ref(),
-            domain: &domain.cells,
-            guard: &guard,
-            watch: watch.as_ref(),
-            solution: &domain.solution,
-            candidates: &candidates,
-            depth_max: INPUTS_DEPTH_MAX,
-            rounds: self.rounds(),
-        }
-        .run()?;
-        covered.cells.add(&domain.cells);
-        if law == Law::C2
-            && !stay
-            && let Some(target) = &target
-        {
-            covered.cells.add(target);
-        }
-        Ok(finish(
-            law,
-            solved,
-            target,
-            &domain.cells,
-            inputs,
-            domain.part,
-        ))
-    }
 }
 
 /// Puts a law together.
@@ -453,7 +283,7 @@ fn finish(
             winning_cells: solved.solution.winning,
             domain_cells: cells.count(),
             domain_leaves: part.tree.leaves() as u32,
-            half_spaces: part.spaces.spaces.len() as u32,
+            half_spaces: part.predicates.spaces.len() as u32,
             entries: inputs.tree.leaves() as u32,
             laws: inputs.laws.laws.len() as u32,
             steps_minimal: worst(&solved.solution.ranks),
@@ -464,19 +294,6 @@ fn finish(
             domain: part.bytes,
             inputs: inputs.bytes,
         },
-    }
-}
-
-/// Cells at which a law later in the chain, or Fixed, answers.
-struct Covered {
-    cells: BitSet,
-}
-
-impl Covered {
-    fn none(cells: usize) -> Self {
-        Self {
-            cells: BitSet::new(cells),
-        }
     }
 }
 

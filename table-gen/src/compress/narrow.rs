@@ -8,13 +8,14 @@
 
 use firmware::grid::Cell;
 use firmware::table::{AffineFunction, Law};
+use rayon::prelude::*;
 
 use super::CompressError;
 use super::cells::LabelledCell;
 use super::encode::encode_inputs;
 use super::inputs::{CompressedInputs, InputsTask};
 use super::law_set::{LawSet, choose_laws};
-use super::membership::{DomainPart, HalfSpaces, describe};
+use super::membership::{DomainPart, Predicates, describe};
 use super::tree::build;
 use crate::abstraction::Abstraction;
 use crate::emit::{EncodedLaw, dense};
@@ -127,7 +128,7 @@ impl Controller {
         let everywhere = shape.cells() <= CELLS_ALL_MAX;
         let boxed =
             |cell: &[u16; STATES]| (0..STATES).all(|d| (low[d]..=high[d]).contains(&cell[d]));
-        let listed = (0..shape.cells()).filter_map(|index| {
+        let listed = (0..shape.cells()).into_par_iter().filter_map(|index| {
             let cell = narrow(index);
             if asked.contains(index) {
                 return Some((cell, true));
@@ -139,7 +140,13 @@ impl Controller {
             let free = self.solution.masks[index] >> level & 1 == 1;
             (!free).then_some((cell, false))
         });
-        let mut part = describe(listed, &HalfSpaces::default(), 0, DEPTH_MAX)?;
+        let mut part = describe(
+            listed,
+            shape.count.map(|n| n as u16),
+            &Predicates::default(),
+            0,
+            DEPTH_MAX,
+        )?;
         if !everywhere && !asked.is_empty() {
             part.confine(low, high, shape.count)?;
         }

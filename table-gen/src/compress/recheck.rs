@@ -47,8 +47,8 @@ pub struct Recheck {
     pub steps: u16,
 }
 
-/// Plays the game with the law's own answers. For C1 and C2 `target` is where it ends; Hold has none: every answer must
-/// keep all successors in the domain.
+/// Plays the game with the law's own answers, and C1's in its place where C2 has none. For C1 and C2 `target` is where it
+/// ends; Hold has none: every answer must keep all successors in the domain.
 ///
 /// # Errors
 /// A game without a result.
@@ -60,10 +60,16 @@ pub fn recheck(
     target: Option<&BitSet>,
 ) -> Result<Recheck, CompressError> {
     let shape = abstraction.shape();
-    let levels = match table.law(law) {
+    let of = |law| match table.law(law) {
         Some(view) => levels(shape, view),
         None => vec![None; shape.cells()],
     };
+    let mut levels = of(law);
+    if law == Law::C2 {
+        for (level, before) in levels.iter_mut().zip(of(Law::C1)) {
+            *level = level.or(before);
+        }
+    }
     let domain = domain_of(&levels);
     let answer = |index: usize, _: [u32; STATES]| levels[index].map_or(0, |level| 1u32 << level);
     // Staying is one step of "reach the domain from the domain", with every cell of it won or none.
@@ -75,6 +81,7 @@ pub fn recheck(
         abstraction,
         target,
         domain: &domain,
+        settled: None,
         guard,
         watch: &Unwatched,
     };

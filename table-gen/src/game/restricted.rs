@@ -29,6 +29,8 @@ pub struct Restricted<'g, const D: usize, A, G> {
     pub target: &'g BitSet,
     /// Cells outside domain and target count as lost.
     pub domain: &'g BitSet,
+    /// Cells that another controller decides: they keep to what was chosen for them, even as a last resort.
+    pub settled: Option<&'g BitSet>,
     /// Forbids inputs.
     pub guard: &'g G,
     /// Told of every sweep.
@@ -46,6 +48,7 @@ impl<const D: usize, A: Abstraction<D>, G: Guard<D>> Restricted<'_, D, A, G> {
             abstraction,
             target,
             domain,
+            settled,
             guard,
             watch,
         } = *self;
@@ -87,6 +90,9 @@ impl<const D: usize, A: Abstraction<D>, G: Guard<D>> Restricted<'_, D, A, G> {
                                 0 => 0,
                                 mask => guard.permitted(cell, mask),
                             };
+                        let is_settled =
+                            settled.is_some_and(|cells| cells.contains(*index as usize));
+                        let resort = if is_settled { 0 } else { resort };
                         if permitted(*inputs | resort) == 0 {
                             left.push((*index, *inputs));
                         } else {

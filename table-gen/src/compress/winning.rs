@@ -1,0 +1,185 @@
+//! `table.domain = "winning"`: laws that cover every winning cell, or all but what the options allow to give up.
+//!
+//! The phase machine asks C2 only where f lies in I1; outside it C1 decides, also on the way to I2. So where both laws
+//! exist and nothing is to be held, C2's part needs entries in I1 alone: its game is played with C1's answers fixed
+//! everywhere else. Where that does not win, and with `stay`, every law covers its own winning cells.
+
+use firmware::grid::Cell;
+use firmware::table::Law;
+use rayon::prelude::*;
+
+use super::domain::{DEPTH_MAX, Play};
+use super::inputs::{CompressedInputs, InputsTask};
+use super::membership::{Predicates, describe};
+use super::{
+    CompressError, CompressedLaw, CompressedLaws, Context, INPUTS_DEPTH_MAX, deadbeat, finish,
+    target,
+};
+use crate::abstraction::Abstraction;
+use crate::game::bitset::BitSet;
+use crate::game::restricted::Restricted;
+use crate::plant::STATES;
+use crate::synthesis::{SolvedLaw, Synthesis};
+
+/// A law and what it was made from.
+struct Made {
+    law: CompressedLaw,
+    cells: BitSet,
+    inputs: CompressedInputs,
+}
+
+impl Context<'_, '_> {
+    /// Laws that cover the winning cells.
+    ///
+    /// # Errors
+    /// A game without a result, or a tree that the format cannot hold.
+    pub(super) fn winning(&self, synthesis: &Synthesis) -> Result<CompressedLaws, CompressError> {
+        if !self.spec.requirements.stay
+            && let Some(c2) = &synthesis.c2
+            && let Some(laws) = self.side_by_side(synthesis, c2)?
+        {
+            return Ok(laws);
+        }
+        self.one_by_one(synthesis)
+    }
+
+    /// Every law covers its own winning cells.
+    fn one_by_one(&self, synthesis: &Synthesis) -> Result<CompressedLaws, CompressError> {
+        let stay = self.spec.requirements.stay;
+        let mut done = Vec::new();
+        // Cells at which a law later in the chain, or Fixed, answers.
+        let mut covered = BitSet::new(self.abstraction.shape().cells());
+        // Backwards from where the event ends: a law that gives cells up shrinks the target of the one before it.
+        for (law, solved) in [
+            (Law::Hold, synthesis.hold.as_ref()),
+            (Law::C2, synthesis.c2.as_ref()),
+            (Law::C1, Some(&synthesis.c1)),
+        ] {
+            let Some(solved) = solved else { continue };
+            if law == Law::C2 && !stay {
+                covered.add(&target(&solved.solution.ranks));
+            }
+            let made = self.law(law, solved, &covered)?;
+            covered.add(&made.cells);
+            done.push(made.law);
+        }
+        done.reverse();
+        Ok(CompressedLaws { laws: done })
+    }
+
+    /// C1 outside I1, C2 inside; `None` if C2's game is not won everywhere that way.
+    fn side_by_side(
+        &self,
+        synthesis: &Synthesis,
+        c2: &SolvedLaw,
+    ) -> Result<Option<CompressedLaws>, CompressError> {
+        let outer = target(&synthesis.c1.solution.ranks);
+        let inner = target(&c2.solution.ranks);
+        let mut asked = c2.solution.winning_set(false);
+        asked.keep(&outer);
+        let mut covered = asked.clone();
+        covered.add(&inner);
+        let c1 = self.law(Law::C1, &synthesis.c1, &covered)?;
+        let choice = |_: usize, cell: [u32; STATES]| {
+            let cell = cell.map(|i| i as u16);
+            1u32 << c1.inputs.laws.level(c1.inputs.tree.leaf(Cell(cell)), cell)
+        };
+        let guard = self.guard(Law::C2);
+        let watch = self.watch(Law::C2);
+        let mut everywhere = asked.clone();
+        everywhere.add(&c1.cells);
+        let all = u32::MAX >> (u32::BITS - self.abstraction.inputs() as u32);
+        let game = Restricted {
+            abstraction: self.abstraction,
+            target: &inner,
+            domain: &everywhere,
+            settled: Some(&c1.cells),
+            guard: &guard,
+            watch: watch.as_ref(),
+        };
+        let decided = |index: usize, cell: [u32; STATES]| {
+            if c1.cells.contains(index) {
+                choice(index, cell)
+            } else {
+                all
+            }
+        };
+        let solution = game.reach(&decided, false)?;
+        if solution.winning != everywhere.count() {
+            return Ok(None);
+        }
+        let shape = self.abstraction.shape();
+        let count = shape.count.map(|n| n as u16);
+        // In I2 Fixed answers and C2 is never asked.
+        let cells = (0..shape.cells())
+            .into_par_iter()
+            .filter(|index| !inner.contains(*index))
+            .map(|index| (shape.cell(index).map(|i| i as u16), asked.contains(index)));
+        let part = describe(cells, count, &Predicates::default(), 0, DEPTH_MAX)?;
+        let candidates = deadbeat::candidates(self.spec, shape, self.band(Law::C2));
+        let inputs = InputsTask {
+            abstraction: self.abstraction,
+            target: Some(&inner),
+            domain: &asked,
+            others: Some((&c1.cells, &choice)),
+            guard: &guard,
+            watch: watch.as_ref(),
+            solution: &solution,
+            candidates: &candidates,
+            depth_max: INPUTS_DEPTH_MAX,
+            rounds: self.rounds(),
+        }
+        .run()?;
+        let c2 = finish(Law::C2, c2, Some(inner), &everywhere, inputs, part);
+        Ok(Some(CompressedLaws {
+            laws: vec![c1.law, c2],
+        }))
+    }
+
+    /// A law that covers its own winning cells; `covered` are those at which a later law or Fixed answers.
+    fn law(&self, law: Law, solved: &SolvedLaw, covered: &BitSet) -> Result<Made, CompressError> {
+        let guard = self.guard(law);
+        let watch = self.watch(law);
+        let target = (law != Law::Hold).then(|| {
+            let mut target = target(&solved.solution.ranks);
+            if self.spec.requirements.stay {
+                target.keep(covered);
+            }
+            target
+        });
+        // Cells that no decision brings to this law: a later one answers there, or f is in I2 and Fixed does.
+        let mut unasked = covered.clone();
+        if let Some(target) = &target {
+            unasked.keep(target);
+        }
+        let play = Play {
+            spec: self.spec,
+            abstraction: self.abstraction,
+            guard: &guard,
+            watch: watch.as_ref(),
+            target: target.as_ref(),
+            unasked: &unasked,
+        };
+        let domain = play.domain(&solved.solution, self.options.exact_domain)?;
+        let candidates = deadbeat::candidates(self.spec, self.abstraction.shape(), self.band(law));
+        let inputs = InputsTask {
+            abstraction: self.abstraction,
+            target: target.as_ref(),
+            domain: &domain.cells,
+            others: None,
+            guard: &guard,
+            watch: watch.as_ref(),
+            solution: &domain.solution,
+            candidates: &candidates,
+            depth_max: INPUTS_DEPTH_MAX,
+            rounds: self.rounds(),
+        }
+        .run()?;
+        let part = domain.part;
+        Ok(Made {
+            law: finish(law, solved, target, &domain.cells, inputs.clone(), part),
+            cells: domain.cells,
+            inputs,
+        })
+    }
+}
