@@ -352,7 +352,7 @@ fn blocks_are_refused_for_their_own_reasons() {
 }
 
 /// One look-ahead: f rises by two cells a step for at most three steps, until it is in 6..=7; g must not pass 2.
-const LOOK_AHEAD: [u8; 72] = [
+const LOOK_AHEAD: [u8; 76] = [
     0x00, 0x00, 0x01, // no half-space, no hull, one look-ahead
     0x04, 0x03, 0x00, 0x00, // four fractional bits, three steps
     0x06, 0x00, 0x07, 0x00, // ends well in f 6..=7
@@ -363,7 +363,8 @@ const LOOK_AHEAD: [u8; 72] = [
     0x00, 0x00, 0x00, 0x00, 0x00, 0x00, 0x10, 0x00, // p' = p
     0x20, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00, // near offsets of f, g
     0x00, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00, // of l, p
-    0x10, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00, // far offsets: g one more a step, l none
+    0x10, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00,
+    0x00, // far offsets: g one more a step, l and p none
     0x3A, // the look-ahead decides everywhere
 ];
 
@@ -408,10 +409,10 @@ fn a_look_ahead_answers_as_drawn() {
     );
     assert_eq!(law.worst_visits(), 5);
     assert_eq!(
-        LookAhead::read(LOOK_AHEAD[3..71].first_chunk().unwrap())
+        LookAhead::read(LOOK_AHEAD[3..75].first_chunk().unwrap())
             .unwrap()
             .write(),
-        LOOK_AHEAD[3..71]
+        LOOK_AHEAD[3..75]
     );
     let of_c1 = |reason| TableError::BadBlock {
         law: Law::C1,
@@ -425,7 +426,7 @@ fn a_look_ahead_answers_as_drawn() {
         (3, 0x10, BlockError::BadShape),
         (4, 0x00, BlockError::BadShape),
         (13, 0x0A, BlockError::Overflow),
-        (71, 0x3B, BlockError::BadLevel),
+        (75, 0x3B, BlockError::BadLevel),
     ] {
         let mut part = LOOK_AHEAD;
         part[at] = byte;

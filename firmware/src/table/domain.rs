@@ -13,7 +13,7 @@
 //! | 1 | 1 | the first m of them are the hull, m <= n |
 //! | 2 | 1 | look-aheads, 0..=4 |
 //! | 3 | 12 each | the half-spaces, see [`AffineFunction`]: a cell is inside where the value is not negative |
-//! | | 68 each | the look-aheads, see [`super::LookAhead`] |
+//! | | 72 each | the look-aheads, see [`super::LookAhead`] |
 //! | | | the tree, see [`super::Node`] |
 //!
 //! | leaf | the cell is covered |

@@ -2,7 +2,7 @@
 //!
 //! Past one step ahead the edge of a winning set is ragged, because every step of the abstraction rounds to whole cells.
 //! A look-ahead rounds in the same way: it holds one input (the strongest or none) and follows the *near* corner of the
-//! successor boxes, the one that comes closest to a limit, and beside it the *far* bounds of g and l, step by step, in
+//! successor boxes, the one that comes closest to a limit, and beside it the *far* bounds of g, l and p, step by step, in
 //! whole cells. The cell is covered if f comes into a band before a bound leaves its range, or if the steps run out.
 //!
 //! | offset | bytes | field |
@@ -14,11 +14,11 @@
 //! | 8 | 2 × 2 | cells of f that a step must not leave: first, last |
 //! | 12 | 16 × 2 | factors F, row by row: of the indices f, g, l, p on the next f, then g, l, p (i16) |
 //! | 44 | 4 × 4 | near offsets a of f, g, l, p (i32) |
-//! | 60 | 2 × 4 | far offsets b of g, l (i32) |
+//! | 60 | 3 × 4 | far offsets b of g, l, p (i32) |
 //!
 //! ```text
 //! near'_d = floor((Σ_j F_dj near_j + a_d) / 2^s)
-//! far'_d  = floor((Σ_j F_dj near_j + F_dd (far_d - near_d) + b_d) / 2^s)      for g and l
+//! far'_d  = floor((Σ_j F_dj near_j + Σ_{g <= j <= d} F_dj (far_j - near_j) + b_d) / 2^s)
 //! ```
 //!
 //! Both begin at the cell's indices, of which f must lie in its range already. After each step g, l and p must lie on the
@@ -32,7 +32,7 @@ use crate::grid::{Cell, Grid};
 use crate::units::{AXIS_F, STATES};
 
 /// Bytes of a look-ahead.
-pub const LOOK_AHEAD_LEN: usize = 68;
+pub const LOOK_AHEAD_LEN: usize = 72;
 /// Most fractional bits.
 pub const LOOK_AHEAD_SHIFT_MAX: u8 = 15;
 /// Most steps.
@@ -57,8 +57,8 @@ pub struct LookAhead {
     pub factors: [[i16; STATES]; STATES],
     /// Offsets of the near corner.
     pub near: [i32; STATES],
-    /// Offsets of the far bounds of g and l.
-    pub far: [i32; 2],
+    /// Offsets of the far bounds of g, l and p.
+    pub far: [i32; 3],
 }
 
 impl LookAhead {
@@ -114,12 +114,13 @@ impl LookAhead {
     /// Whether no partial sum leaves 32 bits while the bounds are on the grid.
     pub fn fits(&self, grid: &Grid) -> bool {
         let count = grid.count();
-        // g and l have a far bound, in this order.
+        // g, l and p have a far bound, in this order.
         let far = |d: usize| d.checked_sub(1).and_then(|at| self.far.get(at));
         (0..STATES).all(|d| {
             let reach =
                 |j: usize| i64::from(self.factors[d][j].unsigned_abs()) * i64::from(count[j] - 1);
-            let sum: i64 = (0..STATES).map(reach).sum::<i64>() + reach(d);
+            // Far rows add a second share of the indices, at most all of them.
+            let sum: i64 = 2 * (0..STATES).map(reach).sum::<i64>();
             let near = i64::from(self.near[d].unsigned_abs());
             let offset = near.max(far(d).map_or(0, |far| i64::from(far.unsigned_abs())));
             sum + offset <= i64::from(i32::MAX)
@@ -154,7 +155,7 @@ pub(super) fn covers(
     let [f, g, l, p] = cell.0.map(i32::from);
     let [_, g_count, l_count, p_count] = count.map(u32::from);
     let (mut f, mut g, mut l, mut p) = (f, g, l, p);
-    let (mut g_far, mut l_far) = (g, l);
+    let (mut g_far, mut l_far, mut p_far) = (g, l, p);
     // Sums cannot overflow while the bounds are on the grid, which `fits` checked; wrapping says so to the compiler.
     let sum = |d: usize, [f, g, l, p]: [i32; STATES]| {
         factor(d, 0)
@@ -172,12 +173,19 @@ pub(super) fn covers(
         }
         let x = [f, g, l, p];
         let near = |d: usize| sum(d, x).wrapping_add(offset(NEAR_AT + 4 * d)) >> shift;
-        let far = |d: usize, ahead: i32, at: usize| {
-            let apart = factor(d, d).wrapping_mul(ahead);
-            sum(d, x).wrapping_add(apart).wrapping_add(offset(at)) >> shift
+        let far = |d: usize, apart: i32| {
+            let sum = sum(d, x).wrapping_add(apart);
+            sum.wrapping_add(offset(FAR_AT + 4 * (d - 1))) >> shift
         };
-        g_far = far(1, g_far.wrapping_sub(g), FAR_AT);
-        l_far = far(2, l_far.wrapping_sub(l), FAR_AT + 4);
+        let apart = [
+            g_far.wrapping_sub(g),
+            l_far.wrapping_sub(l),
+            p_far.wrapping_sub(p),
+        ];
+        let of = |d: usize, j: usize| factor(d, j).wrapping_mul(apart[j - 1]);
+        g_far = far(1, of(1, 1));
+        l_far = far(2, of(2, 1).wrapping_add(of(2, 2)));
+        p_far = far(3, of(3, 1).wrapping_add(of(3, 2)).wrapping_add(of(3, 3)));
         (f, g, l, p) = (near(0), near(1), near(2), near(3));
         let on_grid = |index: i32, count: u32| index.cast_unsigned() < count;
         let kept = within(f, limit)
@@ -185,7 +193,8 @@ pub(super) fn covers(
             && on_grid(g_far, g_count)
             && on_grid(l, l_count)
             && on_grid(l_far, l_count)
-            && on_grid(p, p_count);
+            && on_grid(p, p_count)
+            && on_grid(p_far, p_count);
         if !kept {
             return (false, step + 1);
         }
@@ -205,7 +214,7 @@ mod tests {
             (0u8..=15, 1u8..=15, band(), band()),
             proptest::array::uniform4(proptest::array::uniform4(-9000i16..9000)),
             proptest::array::uniform4(offset()),
-            proptest::array::uniform2(offset()),
+            proptest::array::uniform3(offset()),
         )
             .prop_map(
                 |((shift, steps, done, limit), factors, near, far)| LookAhead {
@@ -243,8 +252,9 @@ mod tests {
             for d in 0..4 {
                 next[d] = (sum(d) + i128::from(ahead.near[d])).div_euclid(unit);
                 next_far[d] = match d {
-                    1 | 2 => {
-                        let apart = i128::from(ahead.factors[d][d]) * (far[d] - near[d]);
+                    1..=3 => {
+                        let of = |j: usize| i128::from(ahead.factors[d][j]) * (far[j] - near[j]);
+                        let apart: i128 = (1..=d).map(of).sum();
                         (sum(d) + apart + i128::from(ahead.far[d - 1])).div_euclid(unit)
                     }
                     _ => next[d],
@@ -271,7 +281,7 @@ mod tests {
             limit: [0, 9],
             factors: [[16, 0, 0, 0], [0, 16, 0, 0], [0, 0, 16, 0], [0, 0, 0, 16]],
             near: [-16, 32, 0, 0],
-            far: [48, 0],
+            far: [48, 0, 0],
         };
         let count = [10, 10, 10, 10];
         let run = |ahead: &LookAhead, f, g| covers(&ahead.write(), Cell([f, g, 5, 5]), count);
@@ -298,7 +308,7 @@ mod tests {
             limit: [1, 5],
             factors: [[1; 4]; 4],
             near: [0; 4],
-            far: [0; 2],
+            far: [0; 3],
         };
         assert_eq!(LookAhead::read(&good.write()), Some(good));
         for (at, value) in [(0, 16), (1, 0), (1, 16), (2, 1), (3, 1), (4, 4), (8, 6)] {
@@ -309,7 +319,7 @@ mod tests {
         let grid = |f| Grid::new([0; 4], [1; 4], [f, 4, 4, 4]).unwrap();
         assert!(good.fits(&grid(6)));
         assert!(!good.fits(&grid(5)), "the limit is past the grid");
-        let far = [i32::MAX - 11, 0];
+        let far = [i32::MAX - 23, 0, 0];
         assert!(!LookAhead { far, ..good }.fits(&grid(6)));
     }
 
@@ -336,7 +346,7 @@ mod tests {
         #[test]
         fn agrees_over_many_steps(
             cell in proptest::array::uniform4(0u16..30), near in proptest::array::uniform4(0i32..60_000),
-            spread in proptest::array::uniform2(0i32..9000), mixed in proptest::array::uniform4(-900i16..900),
+            spread in proptest::array::uniform3(0i32..9000), mixed in proptest::array::uniform4(-900i16..900),
         ) {
             let mut factors = [[0i16; 4]; 4];
             for d in 0..4 {
@@ -345,7 +355,7 @@ mod tests {
             }
             let ahead = LookAhead {
                 shift: 13, steps: 8, done: [0, 2], limit: [0, 29], factors, near,
-                far: [near[1] + spread[0], near[2] + spread[1]],
+                far: [near[1] + spread[0], near[2] + spread[1], near[3] + spread[2]],
             };
             let (covered, _) = covers(&ahead.write(), Cell(cell), [30; 4]);
             prop_assert_eq!(covered, slowly(&ahead, cell, [30; 4]));

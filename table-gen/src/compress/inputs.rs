@@ -85,7 +85,11 @@ impl InputsTask<'_> {
                 1u32 << next.laws.level(leaf, cell)
             };
             let again = self.reach(target, &choice, false)?;
-            let steps = self.worst_rank(&again);
+            // Where another law may answer instead, the ranks that the tree was made from bound both.
+            let steps = match self.others {
+                None => self.worst_rank(&again),
+                Some(_) => self.worst_rank(&solution),
+            };
             if next.bytes.len() < best.bytes.len() {
                 best = CompressedInputs { steps, ..next };
             }

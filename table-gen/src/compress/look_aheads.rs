@@ -8,7 +8,7 @@
 
 use firmware::grid::{Cell, Grid};
 use firmware::table::{LOOK_AHEAD_LEN, LOOK_AHEAD_SHIFT_MAX, LookAhead};
-use firmware::units::{AXIS_F, AXIS_G, AXIS_L};
+use firmware::units::{AXIS_F, AXIS_G, AXIS_L, AXIS_P};
 use rayon::prelude::*;
 
 use crate::abstraction::Abstraction;
@@ -200,14 +200,14 @@ fn look_ahead(
     let lower = |d: usize, more: i32| ((centre(d) - apart(d, more)) * unit).floor() as i32;
     let upper = |d: usize, more: i32| ((centre(d) + apart(d, more)) * unit).ceil() as i32;
     let more = |d: usize| if d == AXIS_L { margins.near_l } else { 0 };
-    let (near, far): ([i32; STATES], [i32; 2]) = match course {
+    let (near, far): ([i32; STATES], [i32; 3]) = match course {
         Course::Rise => (
             std::array::from_fn(|d| lower(d, more(d))),
-            [upper(AXIS_G, 0), upper(AXIS_L, 0)],
+            [AXIS_G, AXIS_L, AXIS_P].map(|d| upper(d, 0)),
         ),
         Course::Fall => (
             std::array::from_fn(|d| upper(d, more(d))),
-            [lower(AXIS_G, 0), lower(AXIS_L, 0)],
+            [AXIS_G, AXIS_L, AXIS_P].map(|d| lower(d, 0)),
         ),
     };
     let ahead = LookAhead {

@@ -2,10 +2,12 @@
 //!
 //! The phase machine asks C2 only where f lies in I1; outside it C1 decides, also on the way to I2. So where both laws
 //! exist and nothing is to be held, C2's part needs entries in I1 alone: its game is played with C1's answers fixed
-//! everywhere else. Where that does not win, and with `stay`, every law covers its own winning cells.
+//! everywhere else. Cells that I1 cuts belong to both: they are ranked by C1's answer, and C2 may give any input that
+//! lowers that rank as well. Where this does not win, and with `stay`, every law covers its own winning cells.
 
 use firmware::grid::Cell;
 use firmware::table::Law;
+use firmware::units::AXIS_F;
 use rayon::prelude::*;
 
 use super::domain::{DEPTH_MAX, Play};
@@ -80,6 +82,9 @@ impl Context<'_, '_> {
         let mut covered = asked.clone();
         covered.add(&inner);
         let c1 = self.law(Law::C1, &synthesis.c1, &covered)?;
+        let row = self.asked_of_c2();
+        let cut = c1.cells.iter().filter(|index| row[index % row.len()]);
+        let cut: Vec<usize> = cut.collect();
         let choice = |_: usize, cell: [u32; STATES]| {
             let cell = cell.map(|i| i as u16);
             1u32 << c1.inputs.laws.level(c1.inputs.tree.leaf(Cell(cell)), cell)
@@ -108,6 +113,9 @@ impl Context<'_, '_> {
         if solution.winning != everywhere.count() {
             return Ok(None);
         }
+        for index in cut {
+            asked.insert(index);
+        }
         let shape = self.abstraction.shape();
         let count = shape.count.map(|n| n as u16);
         // In I2 Fixed answers and C2 is never asked.
@@ -134,6 +142,24 @@ impl Context<'_, '_> {
         Ok(Some(CompressedLaws {
             laws: vec![c1.law, c2],
         }))
+    }
+
+    /// Whether C2 may be asked, for each cell of f: some of its frequencies lie in I1 and not in I2.
+    fn asked_of_c2(&self) -> Vec<bool> {
+        let [outer_low, outer_high] = self.spec.requirements.outer_micro();
+        let [inner_low, inner_high] = self.spec.requirements.inner_micro();
+        let edge = |f: i64| {
+            i64::from(self.grid.lower_edge()[AXIS_F]) + i64::from(self.grid.width()[AXIS_F]) * f
+        };
+        let meets = |f: i64, low: i32, high: i32| {
+            edge(f).max(i64::from(low)) <= (edge(f + 1) - 1).min(i64::from(high))
+        };
+        (0..i64::from(self.grid.count()[AXIS_F]))
+            .map(|f| {
+                meets(f, outer_low, inner_low.saturating_sub(1))
+                    || meets(f, inner_high.saturating_add(1), outer_high)
+            })
+            .collect()
     }
 
     /// A law that covers its own winning cells; `covered` are those at which a later law or Fixed answers.
