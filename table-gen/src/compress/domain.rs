@@ -23,7 +23,7 @@ use crate::spec::Spec;
 use crate::synthesis::OptionalGuard;
 
 /// Share of the winning cells that may be given up: one in this many.
-const GIVE_UP_ONE_IN: usize = 100;
+pub const GIVE_UP_ONE_IN: usize = 100;
 /// Descriptions tried with cells given up, before the rest is described exactly.
 const ROUNDS: u32 = 5;
 /// Positions of each half-space of the hull that a leaf may name.

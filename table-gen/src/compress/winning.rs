@@ -10,7 +10,7 @@ use firmware::table::Law;
 use firmware::units::AXIS_F;
 use rayon::prelude::*;
 
-use super::domain::{DEPTH_MAX, Play};
+use super::domain::{DEPTH_MAX, GIVE_UP_ONE_IN, Play};
 use super::inputs::{CompressedInputs, InputsTask};
 use super::membership::{Predicates, describe};
 use super::{
@@ -18,16 +18,31 @@ use super::{
     target,
 };
 use crate::abstraction::Abstraction;
+use crate::game::Solution;
 use crate::game::bitset::BitSet;
 use crate::game::restricted::Restricted;
 use crate::plant::STATES;
 use crate::synthesis::{SolvedLaw, Synthesis};
+
+/// Times that C1 and C2 are fitted to each other.
+const ROUNDS: u32 = 4;
 
 /// A law and what it was made from.
 struct Made {
     law: CompressedLaw,
     cells: BitSet,
     inputs: CompressedInputs,
+}
+
+impl Made {
+    /// The law's input at a cell, as a bit.
+    fn choice(&self, cell: [u32; STATES]) -> u32 {
+        let cell = cell.map(|i| i as u16);
+        1 << self
+            .inputs
+            .laws
+            .level(self.inputs.tree.leaf(Cell(cell)), cell)
+    }
 }
 
 impl Context<'_, '_> {
@@ -61,7 +76,7 @@ impl Context<'_, '_> {
             if law == Law::C2 && !stay {
                 covered.add(&target(&solved.solution.ranks));
             }
-            let made = self.law(law, solved, &covered)?;
+            let made = self.law(law, solved, &covered, stay)?;
             covered.add(&made.cells);
             done.push(made.law);
         }
@@ -69,7 +84,7 @@ impl Context<'_, '_> {
         Ok(CompressedLaws { laws: done })
     }
 
-    /// C1 outside I1, C2 inside; `None` if C2's game is not won everywhere that way.
+    /// C1 outside I1, C2 inside; `None` if that gives up more cells than allowed.
     fn side_by_side(
         &self,
         synthesis: &Synthesis,
@@ -77,43 +92,66 @@ impl Context<'_, '_> {
     ) -> Result<Option<CompressedLaws>, CompressError> {
         let outer = target(&synthesis.c1.solution.ranks);
         let inner = target(&c2.solution.ranks);
+        let guard = self.guard(Law::C2);
+        let watch = self.watch(Law::C2);
+        let all = u32::MAX >> (u32::BITS - self.abstraction.inputs() as u32);
         let mut asked = c2.solution.winning_set(false);
         asked.keep(&outer);
-        let mut covered = asked.clone();
-        covered.add(&inner);
-        let c1 = self.law(Law::C1, &synthesis.c1, &covered)?;
-        let row = self.asked_of_c2();
-        let cut = c1.cells.iter().filter(|index| row[index % row.len()]);
-        let cut: Vec<usize> = cut.collect();
-        let choice = |_: usize, cell: [u32; STATES]| {
-            let cell = cell.map(|i| i as u16);
-            1u32 << c1.inputs.laws.level(c1.inputs.tree.leaf(Cell(cell)), cell)
-        };
+        // What C2 cannot win beside this C1 is given up; C1 then has fewer cells to lead to.
+        for _ in 0..ROUNDS {
+            let mut covered = asked.clone();
+            covered.add(&inner);
+            let c1 = self.law(Law::C1, &synthesis.c1, &covered, true)?;
+            let mut everywhere = asked.clone();
+            everywhere.add(&c1.cells);
+            let given_up = c2.solution.winning.saturating_sub(everywhere.count());
+            let allowed = if self.options.exact_domain {
+                0
+            } else {
+                c2.solution.winning / GIVE_UP_ONE_IN
+            };
+            if given_up > allowed {
+                break;
+            }
+            let game = Restricted {
+                abstraction: self.abstraction,
+                target: &inner,
+                domain: &everywhere,
+                settled: Some(&c1.cells),
+                guard: &guard,
+                watch: watch.as_ref(),
+            };
+            let decided = |index: usize, cell: [u32; STATES]| {
+                if c1.cells.contains(index) {
+                    c1.choice(cell)
+                } else {
+                    all
+                }
+            };
+            let solution = game.reach(&decided, false)?;
+            if solution.winning == everywhere.count() {
+                return self.beside(c1, c2, inner, asked, &solution).map(Some);
+            }
+            asked.keep(&solution.winning_set(false));
+        }
+        Ok(None)
+    }
+
+    /// C2 for the cells of I1 that are asked of it, beside a finished C1; `solution` wins everywhere.
+    fn beside(
+        &self,
+        c1: Made,
+        c2: &SolvedLaw,
+        inner: BitSet,
+        mut asked: BitSet,
+        solution: &Solution,
+    ) -> Result<CompressedLaws, CompressError> {
         let guard = self.guard(Law::C2);
         let watch = self.watch(Law::C2);
         let mut everywhere = asked.clone();
         everywhere.add(&c1.cells);
-        let all = u32::MAX >> (u32::BITS - self.abstraction.inputs() as u32);
-        let game = Restricted {
-            abstraction: self.abstraction,
-            target: &inner,
-            domain: &everywhere,
-            settled: Some(&c1.cells),
-            guard: &guard,
-            watch: watch.as_ref(),
-        };
-        let decided = |index: usize, cell: [u32; STATES]| {
-            if c1.cells.contains(index) {
-                choice(index, cell)
-            } else {
-                all
-            }
-        };
-        let solution = game.reach(&decided, false)?;
-        if solution.winning != everywhere.count() {
-            return Ok(None);
-        }
-        for index in cut {
+        let row = self.asked_of_c2();
+        for index in c1.cells.iter().filter(|index| row[index % row.len()]) {
             asked.insert(index);
         }
         let shape = self.abstraction.shape();
@@ -125,6 +163,7 @@ impl Context<'_, '_> {
             .map(|index| (shape.cell(index).map(|i| i as u16), asked.contains(index)));
         let part = describe(cells, count, &Predicates::default(), 0, DEPTH_MAX)?;
         let candidates = deadbeat::candidates(self.spec, shape, self.band(Law::C2));
+        let choice = |_: usize, cell: [u32; STATES]| c1.choice(cell);
         let inputs = InputsTask {
             abstraction: self.abstraction,
             target: Some(&inner),
@@ -132,16 +171,16 @@ impl Context<'_, '_> {
             others: Some((&c1.cells, &choice)),
             guard: &guard,
             watch: watch.as_ref(),
-            solution: &solution,
+            solution,
             candidates: &candidates,
             depth_max: INPUTS_DEPTH_MAX,
             rounds: self.rounds(),
         }
         .run()?;
         let c2 = finish(Law::C2, c2, Some(inner), &everywhere, inputs, part);
-        Ok(Some(CompressedLaws {
+        Ok(CompressedLaws {
             laws: vec![c1.law, c2],
-        }))
+        })
     }
 
     /// Whether C2 may be asked, for each cell of f: some of its frequencies lie in I1 and not in I2.
@@ -162,13 +201,20 @@ impl Context<'_, '_> {
             .collect()
     }
 
-    /// A law that covers its own winning cells; `covered` are those at which a later law or Fixed answers.
-    fn law(&self, law: Law, solved: &SolvedLaw, covered: &BitSet) -> Result<Made, CompressError> {
+    /// A law that covers its own winning cells; `covered` are those at which a later law or Fixed answers,
+    /// and `within` tells whether the law must lead to those of them.
+    fn law(
+        &self,
+        law: Law,
+        solved: &SolvedLaw,
+        covered: &BitSet,
+        within: bool,
+    ) -> Result<Made, CompressError> {
         let guard = self.guard(law);
         let watch = self.watch(law);
         let target = (law != Law::Hold).then(|| {
             let mut target = target(&solved.solution.ranks);
-            if self.spec.requirements.stay {
+            if within {
                 target.keep(covered);
             }
             target
