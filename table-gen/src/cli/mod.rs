@@ -20,6 +20,7 @@ mod replay;
 mod report;
 mod simulate;
 mod synth;
+mod time_left;
 mod verify;
 
 use std::process::ExitCode;

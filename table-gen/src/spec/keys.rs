@@ -225,8 +225,8 @@ pub(super) const KEYS: &[Key] = &[
     row("grid.alignment", "-", Allowed::Choice(Alignment::NAMES),
         "whether lower and upper are cell centres or cell edges", |s| KeyValue::Text(s.grid.alignment.name())),
 
-    row("input.step", "1", Allowed::Number(Range::closed(0.03, 1.0)),
-        "distance between participations; divides 1", |s| KeyValue::Number(s.input.step)),
+    row("input.step", "1", Allowed::Number(Range::closed(0.001, 1.0)),
+        "distance between participations; divides 1 into at most 31 steps", |s| KeyValue::Number(s.input.step)),
 
     row("sampling.period_s", "s", Allowed::Number(Range::closed(0.001, 3600.0)),
         "sampling time tau of C1, C2 and Hold", |s| KeyValue::Number(s.sampling.period_s)),
