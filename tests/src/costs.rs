@@ -21,6 +21,7 @@ use firmware::link::{Request, Response};
 use firmware::table::{Law, TableView};
 
 use crate::images::{self, BARE, Elf, HOLDFAST, ImageError, PIL};
+use crate::pil::machine::CORTEX_M4;
 use crate::pil::qemu::{PilError, Target, instructions};
 use crate::pil::run::{Pair, closed_loop};
 use crate::pil::scenario;
@@ -259,7 +260,7 @@ pub fn run(table: &[u8]) -> Result<Figures, CostError> {
     );
 
     let pil = images::build(PIL, images::TARGET)?;
-    let mut target = Target::start(&pil, table, true)?;
+    let mut target = Target::start(CORTEX_M4, &pil, table, true)?;
     let wires = Wires::default();
     let mut host = Session::new(&wires, table);
     let mut pair = Pair::new(&mut host, &mut target)?;

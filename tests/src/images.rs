@@ -1,4 +1,4 @@
-//! The Arm images: built by cargo, read as ELF, written as BIN and Intel HEX.
+//! The images: built by cargo, read as ELF, written as BIN and Intel HEX.
 
 use std::ffi::OsString;
 use std::fs;
@@ -13,8 +13,6 @@ use crate::root;
 
 /// Target of the images: the reference board's Cortex-M4F.
 pub const TARGET: &str = "thumbv7em-none-eabihf";
-/// Cortex-M0+, without FPU. Its instructions are a subset of the reference board's, so that an image runs there too.
-pub const TARGET_M0: &str = "thumbv6m-none-eabi";
 /// Start of the FLASH region, from memory.x.
 const FLASH: u32 = 0x0800_0000;
 /// Start of the TABLE region, from memory.x.

@@ -35,6 +35,7 @@ pub(crate) const STEPS: &[Step] = &[
     Step::cargo("clippy", "no lint warns on the host", "clippy --workspace --all-targets -- -D warnings"),
     Step::cargo("clippy-arm", "no lint warns in the firmware for Cortex-M4F, with defmt", "clippy -p firmware --lib --features defmt --target thumbv7em-none-eabihf -- -D warnings"),
     Step::cargo("clippy-images", "no lint warns in the Arm images", "clippy -p firmware --bins --features board,log,pil,bare --target thumbv7em-none-eabihf -- -D warnings"),
+    Step::cargo("clippy-riscv", "no lint warns in the pil image for RV32IMC", "clippy -p firmware --bin pil --features pil --target riscv32imc-unknown-none-elf -- -D warnings"),
     Step::cargo("docs", "the documentation builds without warnings", "doc --workspace --no-deps").with(&[("RUSTDOCFLAGS", "-D warnings")]),
     Step::cargo("build-m4", "the firmware library builds for Cortex-M4F (the reference board)", "build -p firmware --lib --release --target thumbv7em-none-eabihf"),
     Step::cargo("build-m0", "the firmware library builds for Cortex-M0+ (no FPU)", "build -p firmware --lib --release --target thumbv6m-none-eabi"),
@@ -42,7 +43,8 @@ pub(crate) const STEPS: &[Step] = &[
     Step::cargo("host-tests", "unit, property, documentation and cross-crate tests", "test --workspace --release"),
     Step::cargo("images", "the Arm images link; ELF, BIN and HEX are written", "run -p tests --release --bin fw -- images"),
     Step::cargo("pil", "the emulated processor and the host act alike, to the bit", "run -p tests --release --bin fw -- pil"),
-    Step::cargo("pil-m0", "code for Cortex-M0+, with floating point in software, acts alike to the bit", "run -p tests --release --bin fw -- pil --soft-float --scenarios 200"),
+    Step::cargo("pil-m0", "code for Cortex-M0+, with floating point in software, acts alike to the bit", "run -p tests --release --bin fw -- pil --core m0 --scenarios 200"),
+    Step::cargo("pil-riscv", "RV32IMC, with floating point in software, acts alike to the bit", "run -p tests --release --bin fw -- pil --core riscv --scenarios 200"),
     Step::cargo("costs", "flash, RAM, stack and instructions are within their goals and as committed", "run -p tests --release --bin fw -- costs"),
 ];
 

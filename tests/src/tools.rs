@@ -33,6 +33,11 @@ const TOOLS: &[Tool] = &[
         why: "runs the firmware on an emulated Cortex-M4",
     },
     Tool {
+        programs: &["qemu-system-riscv32"],
+        packages: &["qemu-system-misc"],
+        why: "runs the firmware on an emulated RISC-V core",
+    },
+    Tool {
         programs: &["chromium", "chromium-browser", "google-chrome"],
         packages: &["chromium", "fonts-liberation"],
         why: "opens the HTML report and checks what a reader sees",
