@@ -23,31 +23,47 @@ const HEX_RECORD: usize = 16;
 /// An image and the features that it needs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Image {
-    /// Name of the binary.
+    /// Name of its files.
     pub name: &'static str,
+    binary: &'static str,
     features: &'static str,
+    log: bool,
 }
 
-/// The product.
-pub const HOLDFAST: Image = Image {
-    name: "holdfast",
-    features: "board",
-};
-/// The product with log lines.
-pub const HOLDFAST_LOG: Image = Image {
-    name: "holdfast",
-    features: "log",
-};
+impl Image {
+    const fn new(name: &'static str, binary: &'static str, features: &'static str) -> Self {
+        Self {
+            name,
+            binary,
+            features,
+            log: false,
+        }
+    }
+
+    /// An image of the product with log lines.
+    #[must_use]
+    pub const fn with_log(self) -> Self {
+        Self { log: true, ..self }
+    }
+}
+
+/// The product: zero crossings on a timer, control pilot and contactor.
+pub const HOLDFAST: Image = Image::new("holdfast", "holdfast", "board");
+/// Every build of the product: each frequency source with each kind of charger.
+pub const PRODUCTS: [Image; 4] = [
+    HOLDFAST,
+    Image::new("holdfast-ade7953", "holdfast", "board,ade7953"),
+    Image::new("holdfast-bidirectional", "holdfast", "board,bidirectional"),
+    Image::new(
+        "holdfast-ade7953-bidirectional",
+        "holdfast",
+        "board,ade7953,bidirectional",
+    ),
+];
 /// Processor in the loop.
-pub const PIL: Image = Image {
-    name: "pil",
-    features: "pil",
-};
+pub const PIL: Image = Image::new("pil", "pil", "pil");
 /// The charger without a HAL, for measuring.
-pub const BARE: Image = Image {
-    name: "bare",
-    features: "bare",
-};
+pub const BARE: Image = Image::new("bare", "bare", "bare");
 
 /// Why an image cannot be built or read.
 #[derive(Debug, thiserror::Error)]
@@ -92,8 +108,13 @@ fn cargo() -> OsString {
 pub fn build(image: Image, target: &str) -> Result<PathBuf, ImageError> {
     let output = Command::new(cargo())
         .args(["build", "--package", "firmware", "--profile", "firmware"])
-        .args(["--target", target, "--bin", image.name])
+        .args(["--target", target, "--bin", image.binary])
         .args(["--features", image.features])
+        .args(if image.log {
+            &["--features", "log"][..]
+        } else {
+            &[]
+        })
         .args(["--message-format", "json-render-diagnostics"])
         .current_dir(root())
         .stdin(Stdio::null())
@@ -107,7 +128,7 @@ pub fn build(image: Image, target: &str) -> Result<PathBuf, ImageError> {
     String::from_utf8_lossy(&output.stdout)
         .lines()
         .filter_map(|line| serde_json::from_str::<serde_json::Value>(line).ok())
-        .filter(|message| message["target"]["name"] == image.name)
+        .filter(|message| message["target"]["name"] == image.binary)
         .find_map(|message| Some(PathBuf::from(message["executable"].as_str()?)))
         .ok_or(failed)
 }

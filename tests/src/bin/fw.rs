@@ -11,7 +11,7 @@ use firmware::link::session::{Session, Wires};
 use firmware::link::{Request, Setup, SourceKind};
 use table_gen::replay::trace;
 use tests::costs::{self, CostError};
-use tests::images::{self, Elf, HOLDFAST, HOLDFAST_LOG, PIL};
+use tests::images::{self, Elf, PIL, PRODUCTS};
 use tests::pil::machine::{self, Machine};
 use tests::pil::qemu::Target;
 use tests::pil::run::{Outcome, Pair, closed_loop, recorded};
@@ -33,12 +33,12 @@ struct Cli {
 
 #[derive(Debug, Subcommand)]
 enum Command {
-    /// Build both images, print their sizes, write ELF, BIN and HEX (the default)
+    /// Build the images, print their sizes, write ELF, BIN and HEX (the default)
     Images {
         /// Folder for the files
         #[arg(long, default_value = "out/firmware")]
         out: PathBuf,
-        /// Build the product with log lines over the debug probe
+        /// Build the product's images with log lines over the debug probe
         #[arg(long)]
         log: bool,
     },
@@ -118,8 +118,8 @@ fn main() -> ExitCode {
 }
 
 fn build_images(out: &Path, log: bool) -> Result<(), AnyError> {
-    let product = if log { HOLDFAST_LOG } else { HOLDFAST };
-    for image in [product, PIL] {
+    let products = PRODUCTS.map(|image| if log { image.with_log() } else { image });
+    for image in products.into_iter().chain([PIL]) {
         let elf = Elf::read(&images::build(image, images::TARGET)?)?;
         println!("{}", image.name);
         for section in elf.sections()? {
