@@ -107,8 +107,8 @@ pub struct Charger<'t, S, D, W> {
     tick_ms: u16,
     gate: Gate,
     filter: Filter,
-    /// Plant, coefficients, observer; `None` without a table.
-    observer: Option<(PlantParameters, ObserverConfig, Observer)>,
+    /// `None` without a table.
+    observer: Option<Observer>,
     control: ControlLoop<'t>,
     droop: Droop,
     /// Restarted by a fault, and the warm-up that follows is not over.
@@ -137,11 +137,15 @@ impl<'t, S: FrequencySource, D: Dispatch, W: Watchdog> Charger<'t, S, D, W> {
     }
 
     /// The same for a table that was parsed already, as where many chargers share one.
+    ///
+    /// Not inlined: what is put together here must not lie on the stack while the table is parsed, which is where the
+    /// stack is deepest.
+    #[inline(never)]
     pub fn with_table(
         source: S,
         dispatch: D,
         watchdog: W,
-        table: Result<TableView<'t>, TableError>,
+        mut table: Result<TableView<'t>, TableError>,
         config: ChargerConfig,
         cause: ResetCause,
     ) -> Self {
@@ -154,14 +158,13 @@ impl<'t, S: FrequencySource, D: Dispatch, W: Watchdog> Charger<'t, S, D, W> {
         };
         let observer = plant.and_then(|plant| {
             let coefficients = ObserverConfig::new(&plant, tick_ms).ok()?;
-            let observer = Observer::at_rest(coefficients, &plant, 0);
-            Some((plant, coefficients, observer))
+            Some(Observer::at_rest(coefficients, &plant, 0))
         });
         // A chain that is too fast for the tick makes the table as useless as a broken one.
-        let table = match (&observer, table) {
-            (None, Ok(_)) => Err(TableError::BadField { offset: 108 }),
-            (_, table) => table,
-        };
+        let unusable = observer.is_none() && table.is_ok();
+        if unusable {
+            table = Err(TableError::BadField { offset: 108 });
+        }
         let warm_up_ticks = config
             .warm_up_ticks
             .unwrap_or_else(|| plant.map_or(0, |plant| trust_ticks(&plant, tick_ms)));
@@ -303,8 +306,8 @@ impl<'t, S: FrequencySource, D: Dispatch, W: Watchdog> Charger<'t, S, D, W> {
         self.warm_up_left = self.warm_up_ticks;
         self.filter.reset();
         self.control.reset();
-        if let Some((plant, coefficients, observer)) = &mut self.observer {
-            *observer = Observer::at_rest(*coefficients, plant, self.f_uhz);
+        if let (Some(observer), Some(table)) = (&mut self.observer, self.control.table()) {
+            observer.restart(&table.header().plant, self.f_uhz);
         }
     }
 
@@ -340,7 +343,7 @@ impl<'t, S: FrequencySource, D: Dispatch, W: Watchdog> Charger<'t, S, D, W> {
     fn advance(&mut self, f_uhz: i32, report: &mut Report) {
         self.f_uhz = f_uhz;
         report.state = match &mut self.observer {
-            Some((_, _, observer)) => {
+            Some(observer) => {
                 let state = observer.step(f_uhz);
                 report.loss_kw = observer.loss_kw(report.participation);
                 state
@@ -387,7 +390,7 @@ impl<'t, S: FrequencySource, D: Dispatch, W: Watchdog> Charger<'t, S, D, W> {
             report.participation = Participation::from_ppm(ppm);
         }
         report.loss_kw = None;
-        if let Some((_, _, observer)) = &mut self.observer {
+        if let Some(observer) = &mut self.observer {
             observer.reset_loss();
         }
     }

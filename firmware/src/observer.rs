@@ -140,6 +140,11 @@ impl Observer {
         }
     }
 
+    /// Forgets everything: at rest again, at this deviation \[µHz\].
+    pub fn restart(&mut self, plant: &PlantParameters, f_uhz: i32) {
+        *self = Self::at_rest(self.config, plant, f_uhz);
+    }
+
     /// Takes the frequency deviation measured at this tick \[µHz\] and returns the state estimate.
     pub fn step(&mut self, f_uhz: i32) -> State {
         let f_hz = f_uhz as f32 / MICRO as f32;
