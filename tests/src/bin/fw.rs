@@ -174,6 +174,8 @@ fn processor_in_the_loop(
         let outcome = closed_loop(&mut pair, &scenario::event(bidirectional))?;
         tell("the paper's event", &outcome);
     }
+    let outcome = closed_loop(&mut pair, &scenario::recovery())?;
+    tell("the same to its end", &outcome);
     replay(&mut pair)?;
     let mut sum: Option<Outcome> = None;
     for n in 0..scenarios {
@@ -226,10 +228,10 @@ fn replay(pair: &mut Pair<'_, '_>) -> Result<(), AnyError> {
 }
 
 fn tell(what: &str, outcome: &Outcome) {
-    let [warm_up, table, outside, none, hold, safe] = outcome.modes;
+    let [warm_up, table, outside, none, hold, safe, release] = outcome.modes;
     println!(
         "{what}: lowest {:.3} Hz, participation up to {:.3}, faults {:#06x}; ticks: {warm_up} warm-up, \
-         {table} table, {outside} outside, {none} no table, {hold} hold, {safe} safe",
+         {table} table, {outside} outside, {none} no table, {hold} hold, {safe} safe, {release} release",
         50.0 + outcome.lowest_hz,
         outcome.most,
         outcome.faults

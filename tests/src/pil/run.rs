@@ -1,5 +1,6 @@
 //! Host and target in lock step: the same requests, answers compared to the bit, the target's answer closing the loop.
 
+use firmware::fault::Mode;
 use firmware::link::session::Session;
 use firmware::link::{Request, Response, Setup};
 use rand::{RngExt, SeedableRng};
@@ -68,7 +69,7 @@ pub struct Outcome {
     /// Largest participation.
     pub most: f64,
     /// Ticks by mode's number.
-    pub modes: [u32; 6],
+    pub modes: [u32; Mode::ALL.len()],
     /// All faults seen.
     pub faults: u16,
 }
@@ -77,7 +78,7 @@ impl Outcome {
     const NONE: Self = Self {
         lowest_hz: 0.0,
         most: 0.0,
-        modes: [0; 6],
+        modes: [0; Mode::ALL.len()],
         faults: 0,
     };
 
@@ -106,7 +107,7 @@ impl Outcome {
 }
 
 /// The plant that the stand-in table and the paper share.
-fn plant(fleet_gw: f64) -> GridPlant {
+pub fn plant(fleet_gw: f64) -> GridPlant {
     let micro = |value: u32| f64::from(value) * 1e-6;
     let table = stand_in::PLANT;
     GridPlant {
