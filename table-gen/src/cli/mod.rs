@@ -21,6 +21,7 @@ mod replay;
 mod report;
 mod simulate;
 mod synth;
+mod trace;
 mod verify;
 
 use std::process::ExitCode;

@@ -42,7 +42,7 @@ pub fn section(verdict: Option<&Value>, spec: &Spec) -> Option<Section> {
         ),
     };
     let mut section = Section::new(format!("How {claim} fails")).say(answer).say(
-        "The sets contain every trajectory of the spec. They are shown at the decisions on the way to the failure; between the \
+        "Each set contains every state with which the decisions up to it can have been made. The sets are shown at the decisions on the way to the failure; between the \
          decisions they are joined by straight lines, which is a drawing and no bound.",
     );
     section
