@@ -2,14 +2,14 @@
 
 use std::fmt;
 
-use super::Spec;
 use super::allowed::{Allowed, Range};
 use super::claims::Domain;
 use super::grid::{Alignment, MICRO_PER_UNIT};
 use super::plant::Direction;
 use super::sampling::Successor;
+use super::{Spec, formula};
 
-/// One key of the spec, for a listing: `table-gen` prints these as the reference of the spec file.
+/// One key of the spec, for a listing: `table-gen keys` prints these as the reference of the spec file.
 #[derive(Debug, Clone, PartialEq)]
 pub struct KeyDoc {
     /// Dotted path, such as `plant.damping_gw_per_hz`.
@@ -246,6 +246,8 @@ pub(super) const KEYS: &[Key] = &[
     row("uncertainty.initial.upper", STATE_UNIT, STATE,
         "upper corner of the states at the event (f, g, l, p)", |s| KeyValue::Numbers(&s.uncertainty.initial.upper)),
 
+    row(formula::KEY, "-", Allowed::OptionalFormula,
+        "the requirements as temporal logic; gives the keys it speaks of", |s| s.requirements.formula.as_deref().map_or(KeyValue::Absent, KeyValue::Text)),
     row("requirements.containment_hz", "Hz", Allowed::OptionalNumber(Range::closed(-10.0, 0.0)),
         "f never falls below this; absent: no such claim", |s| optional(s.requirements.containment_hz)),
     row("requirements.outer_hz", "Hz", INTERVAL,
