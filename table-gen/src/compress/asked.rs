@@ -5,7 +5,8 @@ use firmware::table::{Law, TableView};
 use super::inputs::InputsTask;
 use super::narrow::Controller;
 use super::{
-    CompressError, CompressedLaws, Context, INPUTS_DEPTH_MAX, deadbeat, finish, reachable, target,
+    CompressError, CompressedLaws, Context, INPUTS_DEPTH_MAX, VISITS_GOAL, deadbeat, finish,
+    reachable, target,
 };
 use crate::abstraction::Abstraction;
 use crate::emit::{self, EmitError};
@@ -46,6 +47,7 @@ impl Context<'_, '_> {
                 solution: &solved.solution,
                 candidates: &candidates,
                 depth_max: INPUTS_DEPTH_MAX,
+                depth_goal: VISITS_GOAL,
                 rounds: self.rounds(),
             };
             let controller = Controller::new(law, &task, &candidates)?;

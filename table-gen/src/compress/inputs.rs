@@ -21,6 +21,9 @@ use crate::game::{GameError, NOT_WON, Solution, Watch};
 use crate::plant::STATES;
 use crate::synthesis::OptionalGuard;
 
+/// Balances tried where the paths of the smallest tree are too long, the smallest trees first.
+const BALANCES: [f64; 3] = [0.15, 0.25, 0.5];
+
 /// A law's inputs, compressed.
 #[derive(Debug, Clone)]
 pub struct CompressedInputs {
@@ -54,6 +57,8 @@ pub struct InputsTask<'t> {
     pub candidates: &'t [AffineFunction],
     /// Most nodes on a path.
     pub depth_max: u32,
+    /// Nodes on a path above which a larger tree with shorter paths is preferred.
+    pub depth_goal: u16,
     /// Rounds of ranking by the tree's own choices; 0 keeps the game's ranks.
     pub rounds: u32,
 }
@@ -90,7 +95,9 @@ impl InputsTask<'_> {
                 None => self.worst_rank(&again),
                 Some(_) => self.worst_rank(&solution),
             };
-            if next.bytes.len() < best.bytes.len() {
+            let short = |inputs: &CompressedInputs| inputs.tree.depth() <= self.depth_goal;
+            let better = next.bytes.len() < best.bytes.len() && short(&next) >= short(&best);
+            if better || short(&next) > short(&best) {
                 best = CompressedInputs { steps, ..next };
             }
             if again.ranks == solution.ranks {
@@ -169,9 +176,20 @@ impl InputsTask<'_> {
                     0
                 }
             });
-        let tree = build(&mut cells, self.depth_max, &|common, cells| {
-            laws.choose(common, cells)
-        });
+        let mut grown = |balance| {
+            build(&mut cells, self.depth_max, balance, &|common, cells| {
+                laws.choose(common, cells)
+            })
+        };
+        // Where no balance makes the paths short enough, the smallest tree it is.
+        let mut tree = grown(0.0);
+        if tree.depth() > self.depth_goal {
+            let mut balanced = BALANCES.into_iter().map(grown);
+            tree = balanced
+                .find(|tree| tree.depth() <= self.depth_goal)
+                .unwrap_or(tree);
+        }
+        drop(cells);
         let (laws, tree) = laws.used(&tree);
         let bytes = encode_inputs(&tree, &laws.laws)?;
         Ok(CompressedInputs {

@@ -150,7 +150,7 @@ fn grow(cells: &mut [LabelledCell], depth_max: u32) -> Grown {
     let plane = if depth_max <= depth_by_halving(cells) {
         widest_plane(cells)
     } else {
-        best_plane(cells)
+        best_plane(cells, 0.0)
     };
     let Some(plane) = plane else { return grown };
     let (left, right) = cut(cells, plane);

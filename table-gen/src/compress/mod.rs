@@ -49,6 +49,8 @@ use membership::DomainPart;
 
 /// Most nodes that a path of a law's inputs tree may have.
 pub const INPUTS_DEPTH_MAX: u32 = 32;
+/// Visits of a lookup, both parts, above which shorter paths are preferred to a smaller tree.
+pub const VISITS_GOAL: u16 = 24;
 /// Rounds of ranking by the tree's own choices.
 pub const ROUNDS: u32 = 8;
 

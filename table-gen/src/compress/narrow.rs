@@ -120,7 +120,7 @@ impl Controller {
             })
             .collect();
         let (low, high) = super::tree::bounds(&cells);
-        let tree = build(&mut cells, depth_max, &|common, cells| {
+        let tree = build(&mut cells, depth_max, 0.0, &|common, cells| {
             self.laws.choose(common, cells)
         });
         let (laws, tree) = self.laws.used(&tree);

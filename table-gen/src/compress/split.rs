@@ -58,8 +58,9 @@ fn cost(cells: u32, fit: u32) -> f64 {
     m * (n / m).log2() + k * (n / k).log2() + EXCEPTION_BITS * m
 }
 
-/// The best plane through cells that no single label fits; `None` if all cells are one.
-pub fn best_plane(cells: &[LabelledCell]) -> Option<Plane> {
+/// The best plane through cells that no single label fits; `None` if all cells are one. With more `balance` the costlier
+/// side counts more: paths get shorter and trees larger.
+pub fn best_plane(cells: &[LabelledCell], balance: f64) -> Option<Plane> {
     let histogram = Histogram::new(cells);
     let mut best: Option<(f64, Plane)> = None;
     for axis in 0..STATES {
@@ -84,8 +85,9 @@ pub fn best_plane(cells: &[LabelledCell]) -> Option<Plane> {
                 fit_left = fit_left.max(left[label]);
                 fit_right = fit_right.max(total[label] - left[label]);
             }
-            let score =
-                cost(left[LABELS], fit_left) + cost(total[LABELS] - left[LABELS], fit_right);
+            let below = cost(left[LABELS], fit_left);
+            let above = cost(total[LABELS] - left[LABELS], fit_right);
+            let score = below + above + balance * below.max(above);
             let plane = Plane {
                 axis,
                 threshold: histogram.low[axis] + at as u16,

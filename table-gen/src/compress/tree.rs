@@ -86,10 +86,15 @@ impl Tree {
 pub type ChooseLeaf<'c> = dyn Fn(u64, &[LabelledCell]) -> u8 + Sync + 'c;
 
 /// Builds a tree of at most `depth_max` nodes on any path that gives every cell one of its labels. Planes are chosen
-/// greedily; where the depth runs out boxes are halved, so the depth must be at least the sum of the axes' bits.
+/// greedily ([`best_plane`] says what `balance` does); where the depth runs out boxes are halved, so the depth must be at least the sum of the axes' bits.
 ///
 /// The order of the cells is lost. The result does not depend on it, nor on the number of threads.
-pub fn build(cells: &mut [LabelledCell], depth_max: u32, choose: &ChooseLeaf<'_>) -> Tree {
+pub fn build(
+    cells: &mut [LabelledCell],
+    depth_max: u32,
+    balance: f64,
+    choose: &ChooseLeaf<'_>,
+) -> Tree {
     let common = cells.iter().fold(u64::MAX, |all, cell| all & cell.labels);
     if common != 0 {
         return Tree::Leaf(choose(common, cells));
@@ -97,7 +102,7 @@ pub fn build(cells: &mut [LabelledCell], depth_max: u32, choose: &ChooseLeaf<'_>
     let plane = if depth_max <= depth_by_halving(cells) {
         widest_plane(cells)
     } else {
-        best_plane(cells)
+        best_plane(cells, balance)
     };
     // One cell alone has its own labels in common: there is a plane.
     let Some(plane) = plane else {
@@ -107,11 +112,14 @@ pub fn build(cells: &mut [LabelledCell], depth_max: u32, choose: &ChooseLeaf<'_>
     let below = depth_max.saturating_sub(1);
     let (left, right) = if left.len() + right.len() >= PARALLEL_CELLS {
         rayon::join(
-            || build(left, below, choose),
-            || build(right, below, choose),
+            || build(left, below, balance, choose),
+            || build(right, below, balance, choose),
         )
     } else {
-        (build(left, below, choose), build(right, below, choose))
+        (
+            build(left, below, balance, choose),
+            build(right, below, balance, choose),
+        )
     };
     Tree::Split {
         plane,
@@ -174,7 +182,7 @@ mod tests {
     #[test]
     fn a_label_in_common_is_one_leaf() {
         let mut cells = [cell(0, 0, 0b011), cell(5, 0, 0b110), cell(9, 3, 0b010)];
-        assert_eq!(build(&mut cells, 20, &lowest), Tree::Leaf(1));
+        assert_eq!(build(&mut cells, 20, 0.0, &lowest), Tree::Leaf(1));
     }
 
     #[test]
@@ -182,7 +190,7 @@ mod tests {
         let mut cells: Vec<_> = (0..8)
             .map(|f| cell(f, 0, if f < 3 { 1 } else { 2 }))
             .collect();
-        let Tree::Split { plane, left, right } = build(&mut cells, 20, &lowest) else {
+        let Tree::Split { plane, left, right } = build(&mut cells, 20, 0.0, &lowest) else {
             panic!("one leaf does not fit");
         };
         assert_eq!((plane.axis, plane.threshold), (0, 3));
@@ -193,13 +201,14 @@ mod tests {
         #[test]
         fn every_cell_gets_a_label_of_its_own_within_the_depth(
             labels in proptest::collection::vec(1u64..16, 5 * 6 * 4), depth in 8u32..30,
+            balance in 0.0..4.0,
         ) {
             let mut cells: Vec<_> = labels.iter().enumerate().map(|(i, labels)| {
                 let i = i as u16;
                 LabelledCell { cell: [i % 5, i / 5 % 6, i / 30, 0], labels: *labels }
             }).collect();
             let original = cells.clone();
-            let tree = build(&mut cells, depth, &lowest);
+            let tree = build(&mut cells, depth, balance, &lowest);
             for cell in original {
                 prop_assert!(cell.labels >> tree.leaf(cell.cell()) & 1 == 1);
             }

@@ -14,8 +14,8 @@ use super::domain::{DEPTH_MAX, GIVE_UP_ONE_IN, Play};
 use super::inputs::{CompressedInputs, InputsTask};
 use super::membership::{Predicates, describe};
 use super::{
-    CompressError, CompressedLaw, CompressedLaws, Context, INPUTS_DEPTH_MAX, deadbeat, finish,
-    target,
+    CompressError, CompressedLaw, CompressedLaws, Context, INPUTS_DEPTH_MAX, VISITS_GOAL, deadbeat,
+    finish, target,
 };
 use crate::abstraction::Abstraction;
 use crate::game::Solution;
@@ -174,6 +174,7 @@ impl Context<'_, '_> {
             solution,
             candidates: &candidates,
             depth_max: INPUTS_DEPTH_MAX,
+            depth_goal: VISITS_GOAL.saturating_sub(part.worst_visits),
             rounds: self.rounds(),
         }
         .run()?;
@@ -233,7 +234,10 @@ impl Context<'_, '_> {
             unasked: &unasked,
         };
         let domain = play.domain(&solved.solution, self.options.exact_domain)?;
-        let candidates = deadbeat::candidates(self.spec, self.abstraction.shape(), self.band(law));
+        // Beside C2, C1 had better aim at I2 as well: C2 has less to put right.
+        let beside = law == Law::C1 && within && !self.spec.requirements.stay;
+        let band = self.band(if beside { Law::C2 } else { law });
+        let candidates = deadbeat::candidates(self.spec, self.abstraction.shape(), band);
         let inputs = InputsTask {
             abstraction: self.abstraction,
             target: target.as_ref(),
@@ -244,6 +248,7 @@ impl Context<'_, '_> {
             solution: &domain.solution,
             candidates: &candidates,
             depth_max: INPUTS_DEPTH_MAX,
+            depth_goal: VISITS_GOAL.saturating_sub(domain.part.worst_visits),
             rounds: self.rounds(),
         }
         .run()?;
