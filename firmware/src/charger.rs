@@ -355,7 +355,8 @@ impl<'t, S: FrequencySource, D: Dispatch, W: Watchdog> Charger<'t, S, D, W> {
             self.warm_up_left -= 1;
             report.mode = Mode::WarmUp;
             report.phase = Phase::Fallback;
-            report.participation = self.droop.participation(report.state);
+            let droop = self.droop.participation(report.state);
+            report.participation = self.control.impose(droop);
             return;
         }
         let action = self.control.step(report.state);
@@ -375,6 +376,7 @@ impl<'t, S: FrequencySource, D: Dispatch, W: Watchdog> Charger<'t, S, D, W> {
         self.lost_ticks = self.lost_ticks.saturating_add(due);
         if self.lost_ticks <= self.config.hold_ticks {
             report.mode = Mode::Hold;
+            self.control.hold(due);
             // The chain follows the last frequency; the loss estimate would see a kink that was not there.
             for _ in 0..due {
                 self.advance(self.f_uhz, report);
