@@ -33,14 +33,15 @@ use firmware::grid::Grid;
 use firmware::table::{InputsKind, LAWS, Law, LawEntry, TableView};
 
 use crate::abstraction::Abstraction;
-use crate::abstraction::affine::{AbstractionError, AffineAbstraction};
+use crate::abstraction::affine::AffineAbstraction;
+use crate::delay::DelayError;
 use crate::emit::{self, EmitError, EncodedLaw};
 use crate::game::bitset::BitSet;
 use crate::game::inclusion::Inclusion;
 use crate::game::{GameError, NOT_WON, Watch};
 use crate::plant::STATES;
 use crate::spec::{self, Spec};
-use crate::synthesis::{self, OptionalGuard, SolvedLaw, Synthesis};
+use crate::synthesis::{self, OptionalGuard, SolvedLaw, Synthesis, SynthesisError};
 use domain::Play;
 use inputs::{CompressedInputs, InputsTask};
 use membership::DomainPart;
@@ -132,7 +133,10 @@ impl CompressedLaws {
 pub enum CompressError {
     /// The abstraction cannot be built.
     #[error(transparent)]
-    Abstraction(#[from] AbstractionError),
+    Synthesis(#[from] SynthesisError),
+    /// A delay that the device cannot predict over.
+    #[error(transparent)]
+    Delay(#[from] DelayError),
     /// A game inside compression has no result.
     #[error("while ranking the compressed law: {0}")]
     Game(#[from] GameError),
@@ -204,8 +208,8 @@ pub fn table<'w>(
     watch: &dyn Fn(&'static str) -> Box<dyn Watch + 'w>,
 ) -> Result<(Vec<u8>, CompressedLaws), CompressError> {
     let laws = compress(spec, synthesis, options, watch)?;
-    let header = emit::header(spec, synthesis.grid)?;
-    let image = emit::assemble(header, &laws.encoded())?;
+    let head = emit::head(spec, synthesis.grid)?;
+    let image = emit::assemble(head, &laws.encoded())?;
     Ok((image, laws))
 }
 
@@ -238,7 +242,7 @@ impl<'w> Context<'_, 'w> {
 
     /// Whether the closed loop from the spec's initial states finds an entry wherever it comes.
     fn covers_the_event(&self, laws: &CompressedLaws) -> Result<bool, CompressError> {
-        let image = emit::assemble(emit::header(self.spec, *self.grid)?, &laws.encoded())?;
+        let image = emit::assemble(emit::head(self.spec, *self.grid)?, &laws.encoded())?;
         let table = TableView::parse(&image).map_err(EmitError::Rejected)?;
         match reachable::reachable(self.spec, self.abstraction, &table) {
             Ok(_) => Ok(true),
@@ -260,7 +264,7 @@ impl<'w> Context<'_, 'w> {
             let Some(solved) = solved else { continue };
             let domain = solved.solution.winning_set(law == Law::Hold);
             let target = (law != Law::Hold).then(|| target(&solved.solution.ranks));
-            let guard = self.guard(law);
+            let guard = self.guard(law)?;
             let watch = self.watch(law);
             let candidates = deadbeat::candidates(self.spec, shape, self.band(law));
             let task = InputsTask {
@@ -281,7 +285,7 @@ impl<'w> Context<'_, 'w> {
         for (controller, ..) in &controllers {
             dense[controller.law as usize] = Some(controller.dense(self.abstraction));
         }
-        let image = emit::assemble(emit::header(self.spec, *self.grid)?, &dense)?;
+        let image = emit::assemble(emit::head(self.spec, *self.grid)?, &dense)?;
         drop(dense);
         let table = TableView::parse(&image).map_err(EmitError::Rejected)?;
         let mut asked = reachable::reachable(self.spec, self.abstraction, &table)?;
@@ -291,7 +295,7 @@ impl<'w> Context<'_, 'w> {
             if !asked.closed {
                 break;
             }
-            let image = emit::assemble(emit::header(self.spec, *self.grid)?, &best.encoded())?;
+            let image = emit::assemble(emit::head(self.spec, *self.grid)?, &best.encoded())?;
             let table = TableView::parse(&image).map_err(EmitError::Rejected)?;
             asked = reachable::reachable(self.spec, self.abstraction, &table)?;
             let next = self.narrow(&controllers, &asked)?;
@@ -332,7 +336,7 @@ impl<'w> Context<'_, 'w> {
         Ok(CompressedLaws { laws })
     }
 
-    fn guard(&self, law: Law) -> OptionalGuard {
+    fn guard(&self, law: Law) -> Result<OptionalGuard, DelayError> {
         match law {
             Law::Hold => synthesis::stay_guard(self.spec, self.grid),
             Law::C1 | Law::C2 => synthesis::containment_guard(self.spec, self.grid),
@@ -369,7 +373,7 @@ impl<'w> Context<'_, 'w> {
         solved: &SolvedLaw,
         covered: &mut Covered,
     ) -> Result<CompressedLaw, CompressError> {
-        let guard = self.guard(law);
+        let guard = self.guard(law)?;
         let watch = self.watch(law);
         let stay = self.spec.requirements.stay;
         let target = (law != Law::Hold).then(|| {
