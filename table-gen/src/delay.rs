@@ -50,7 +50,7 @@ use crate::plant::{GridPlant, STATES};
 use crate::spec::Spec;
 use crate::synthesis::{MICRO, measurement_micro, net_power};
 
-/// Room for E' in the bound of the states \[micro-units\]; E' is checked against it.
+/// Room for ρ, and for states at the trigger outside the grid, in the bound of the states on which ρ rests \[micro-units\].
 const ROOM: f64 = 1e6;
 
 /// The device's coefficients, as the table stores them.
@@ -150,13 +150,16 @@ impl Delay {
             .fold(0.0, f64::max);
 
         let (coefficients, exact) = Self::coefficients(spec, &flow, &tick, ticks)?;
-        let states = states(spec, (&a, &b), delay_s.max(period_s), &possible);
-        let rounding = rounding(spec, &coefficients, &exact, &states);
         let e = measurement_micro(spec);
         let spread = absolute_integral(&a, &b, delay_s);
-        let effective = std::array::from_fn(|d| {
-            up(times(&flow.phi[d], &e) + up(up(spread[d] * under_way) + rounding[d]))
-        });
+        let apart =
+            std::array::from_fn(|d| up(times(&flow.phi[d], &e) + up(spread[d] * under_way)));
+        let states = states(spec, (&a, &b), delay_s.max(period_s), &possible, &apart);
+        let rounding = rounding(spec, &coefficients, &exact, &states);
+        if rounding.iter().any(|rho| *rho > ROOM) {
+            return Err(DelayError);
+        }
+        let effective = std::array::from_fn(|d| up(apart[d] + rounding[d]));
 
         let own = delay_s < period_s;
         let shared_s = delay_s.min(period_s);
@@ -299,6 +302,7 @@ fn states(
     (a, b): (&Matrix<STATES>, &Vector<STATES>),
     time_s: f64,
     possible: &[Interval],
+    apart: &[f64; STATES],
 ) -> [f64; STATES] {
     let grown = largest(a, time_s);
     let driven = absolute_integral(a, b, time_s);
@@ -309,7 +313,7 @@ fn states(
     let grid: [f64; STATES] = std::array::from_fn(|d| {
         let low = f64::from(lower[d]);
         let high = low + f64::from(width[d]) * f64::from(count[d]);
-        low.abs().max(high.abs()) + ROOM
+        low.abs().max(high.abs()) + up(apart[d] + ROOM)
     });
     std::array::from_fn(|d| {
         let mut sum = up(up(driven[d] * power) + e[d]);

@@ -32,8 +32,10 @@ use crate::flow::{Flow, Vector, absolute_integral, absolute_integral_between, ap
 use crate::interval::Interval;
 use crate::plant::STATES;
 
-/// By how much states at the trigger may lie outside the grid, and the most that a prediction may err \[micro-units\].
+/// By how much states at the trigger may lie outside the grid \[micro-units\].
 const ROOM: f64 = 1e6;
+/// Largest ρ that the bound of the estimates, on which ρ rests, has room for \[micro-units\].
+const RHO_MAX: f64 = 1e5;
 
 /// What a level adds over a period to the state that is decided on.
 #[derive(Debug, Clone)]
@@ -120,25 +122,26 @@ impl Knowledge {
             .collect();
         let unknown = deviations.iter().map(|d| d.magnitude()).fold(0.0, f64::max);
 
+        // Without ρ yet: how far the real state may be from ξ.
+        let apart =
+            |d: usize| up(times(&segment.flow.phi[d], e) + up(segment.absolute[d] * unknown));
         let reach: [f64; STATES] = std::array::from_fn(|d| {
             let low = f64::from(header.grid.lower_edge()[d]);
             let width = f64::from(header.grid.width()[d]);
             let high = low + width * f64::from(header.grid.count()[d]);
-            low.abs().max(high.abs()) + ROOM
+            up(low.abs().max(high.abs()) + ROOM.max(up(apart(d) + RHO_MAX)))
         });
         let (estimates, inside) = estimates(model, delay_s.max(period_s), &reach);
         let rho = match table.prediction() {
             Some(part) if inside => rho(table, &part, model, expected, &estimates, ticks),
             _ => [f64::INFINITY; STATES],
         };
-
-        let first = std::array::from_fn(|d| up(times(&segment.flow.phi[d], e) + rho[d]));
-        let real: [f64; STATES] =
-            std::array::from_fn(|d| up(first[d] + up(segment.absolute[d] * unknown)));
-        let limit = real.iter().any(|r| *r > ROOM).then(|| {
+        let limit = rho.iter().any(|rho| *rho > RHO_MAX).then(|| {
             "the table's prediction coefficients are not those of the spec's plant and delay"
                 .to_owned()
         });
+        let first = std::array::from_fn(|d| up(times(&segment.flow.phi[d], e) + rho[d]));
+        let real = std::array::from_fn(|d| up(apart(d) + rho[d]));
 
         // Under the new command for σ in [δ, τ], if the delay is the shorter; under unknown ones for the rest.
         let own = absolute_integral_between(a, b, (delay_s, period_s));
