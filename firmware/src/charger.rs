@@ -339,10 +339,11 @@ impl<'t, S: FrequencySource, D: Dispatch, W: Watchdog> Charger<'t, S, D, W> {
     /// One tick of the observer.
     fn advance(&mut self, f_uhz: i32, report: &mut Report) {
         self.f_uhz = f_uhz;
+        let acting = self.control.acting(report.participation);
         report.state = match &mut self.observer {
             Some((_, _, observer)) => {
                 let state = observer.step(f_uhz);
-                report.loss_kw = observer.loss_kw(report.participation);
+                report.loss_kw = observer.loss_kw(acting);
                 state
             }
             None => State([f_uhz, 0, 0, 0]),

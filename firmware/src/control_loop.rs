@@ -142,6 +142,18 @@ impl<'t> ControlLoop<'t> {
         self.hold(ticks);
     }
 
+    /// The participation that acts until the next tick is decided: with a delay an earlier command, else the last one, which is given.
+    pub fn acting(&self, last: Participation) -> Participation {
+        let Ok(table) = &self.table else { return last };
+        let header = table.header();
+        if header.delay_ticks == 0 {
+            return last;
+        }
+        let ago = header.delay_ticks.min(DELAY_TICKS_MAX - 1);
+        let level = self.history.latest_first().nth(usize::from(ago));
+        header.participation(level.unwrap_or(0))
+    }
+
     /// Takes note that the last command was held for ticks at which nothing was decided.
     pub fn hold(&mut self, ticks: u16) {
         if let Some(last) = self.history.latest_first().next() {
