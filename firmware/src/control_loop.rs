@@ -10,7 +10,7 @@
 use crate::droop::Droop;
 use crate::phase::{Phase, PhaseState, Step};
 use crate::prediction::{DELAY_TICKS_MAX, History};
-use crate::table::{TableError, TableView};
+use crate::table::{Header, TableError, TableView};
 use crate::units::{Participation, State};
 
 /// Who decided the participation.
@@ -98,10 +98,11 @@ impl<'t> ControlLoop<'t> {
         self.state = next;
         let (participation, source) = match step {
             Step::Level(level) => {
-                if table.header().delay_ticks > 0 {
+                let header = table.header();
+                if header.delay_ticks > 0 {
                     self.history.push(level);
                 }
-                (table.header().participation(level), Source::Table)
+                (header.participation(level), Source::Table)
             }
             Step::Outside => {
                 let droop = self.droop.participation(state);
@@ -117,22 +118,34 @@ impl<'t> ControlLoop<'t> {
 
     /// Takes note of a participation for this tick that was decided elsewhere, and returns what is to be commanded: with a delay the
     /// nearest level of the table, else the same.
+    #[inline(never)]
     pub fn impose(&mut self, participation: Participation) -> Participation {
-        let Ok(table) = &self.table else {
+        let Some(header) = self.delayed() else {
             return participation;
         };
-        let header = table.header();
-        if header.delay_ticks == 0 {
-            return participation;
-        }
         let step = header.input_step_ppm;
         // With a single level, or steps of nothing, there is nothing else to command.
         let nearest = (participation.ppm() + step / 2)
             .checked_div(step)
             .unwrap_or(0);
         let level = nearest.min(u32::from(header.levels) - 1) as u8;
+        let commanded = header.participation(level);
         self.history.push(level);
-        header.participation(level)
+        commanded
+    }
+
+    /// The participation that acts until the next tick is decided: with a delay an earlier command, else the last one, which is given.
+    pub fn acting(&self, last: Participation) -> Participation {
+        match self.delayed() {
+            Some(header) => header.participation(self.history.level(header.delay_ticks)),
+            None => last,
+        }
+    }
+
+    /// The header of a table whose commands act late.
+    fn delayed(&self) -> Option<&Header> {
+        let header = self.table.as_ref().ok()?.header();
+        (header.delay_ticks > 0).then_some(header)
     }
 
     /// Lets the period's clock run on by ticks that nobody measured; a decision that fell due meanwhile is made at the next
@@ -142,21 +155,11 @@ impl<'t> ControlLoop<'t> {
         self.hold(ticks);
     }
 
-    /// The participation that acts until the next tick is decided: with a delay an earlier command, else the last one, which is given.
-    pub fn acting(&self, last: Participation) -> Participation {
-        let Ok(table) = &self.table else { return last };
-        let header = table.header();
-        if header.delay_ticks == 0 {
-            return last;
-        }
-        let ago = header.delay_ticks.min(DELAY_TICKS_MAX - 1);
-        let level = self.history.latest_first().nth(usize::from(ago));
-        header.participation(level.unwrap_or(0))
-    }
-
     /// Takes note that the last command was held for ticks at which nothing was decided.
+    #[inline(never)]
     pub fn hold(&mut self, ticks: u16) {
-        if let Some(last) = self.history.latest_first().next() {
+        if self.delayed().is_some() {
+            let last = self.history.level(0);
             for _ in 0..ticks.min(DELAY_TICKS_MAX) {
                 self.history.push(last);
             }

@@ -66,36 +66,39 @@ impl History {
     };
 
     /// Notes the level that a tick has decided; it is that of one tick ago from then on. Bits past the fifth are lost.
+    #[inline(never)]
     pub fn push(&mut self, level: u8) {
-        for (bit, plane) in self.planes.iter_mut().enumerate() {
-            *plane = *plane << 1 | u64::from(level >> bit & 1);
+        let mut level = level;
+        for plane in &mut self.planes {
+            *plane = *plane << 1 | u64::from(level & 1);
+            level >>= 1;
         }
     }
 
-    /// The levels, the latest first.
-    pub fn latest_first(&self) -> impl Iterator<Item = u8> + use<> {
-        let mut planes = self.planes;
-        (0..DELAY_TICKS_MAX).map(move |_| {
-            let mut level = 0;
-            for (bit, plane) in planes.iter_mut().enumerate() {
-                level |= ((*plane & 1) as u8) << bit;
-                *plane >>= 1;
-            }
-            level
-        })
+    /// The level that was noted last (0), or so many before it; past the 63rd that one.
+    #[inline(never)]
+    pub fn level(&self, before: u16) -> u8 {
+        let before = before.min(DELAY_TICKS_MAX - 1);
+        let mut level = 0;
+        for plane in self.planes.iter().rev() {
+            level = level << 1 | (*plane >> before & 1) as u8;
+        }
+        level
     }
 }
 
 /// The prediction part of a table.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct PredictionView<'t> {
-    bytes: &'t [u8],
+    words: &'t [[u8; WORD]],
 }
 
 impl<'t> PredictionView<'t> {
     /// The part in these bytes: [`prediction_len`] of them, for a delay that is not zero.
     pub(crate) const fn new(bytes: &'t [u8]) -> Self {
-        Self { bytes }
+        Self {
+            words: bytes.as_chunks().0,
+        }
     }
 
     /// Φ from a state (column) to a state (row), with [`PHI_FRACTION_BITS`] fractional bits; 0 past the last.
@@ -116,11 +119,12 @@ impl<'t> PredictionView<'t> {
 
     /// Ticks of delay.
     pub fn ticks(&self) -> usize {
-        (self.bytes.len().saturating_sub(LEVELS_AT)) / (WORD * STATES)
+        self.words.len().saturating_sub(LEVELS_AT / WORD) / STATES
     }
 
-    /// The state in n ticks, from what is measured now and what is under way; saturates far outside every grid.
+    /// The state in n ticks, from what is measured now and what is under way; `i32::MAX`, which lies in no grid, for what does not fit.
     #[must_use]
+    #[inline(never)]
     pub fn predict(&self, measured: State, history: &History) -> State {
         let mut sums = [0i64; STATES];
         for (row, sum) in sums.iter_mut().enumerate() {
@@ -131,25 +135,22 @@ impl<'t> PredictionView<'t> {
             }
         }
         let up = PHI_FRACTION_BITS - LEVEL_FRACTION_BITS;
-        for (index, level) in history.latest_first().take(self.ticks()).enumerate() {
+        for ago in 1..=self.ticks() {
+            let level = history.level(ago as u16 - 1);
             if level == 0 {
                 continue;
             }
             for (row, sum) in sums.iter_mut().enumerate() {
-                *sum += i64::from(self.level(index + 1, row)) * i64::from(level) << up;
+                *sum += i64::from(self.level(ago, row)) * i64::from(level) << up;
             }
         }
-        State(sums.map(|sum| {
-            let floor = sum >> PHI_FRACTION_BITS;
-            floor.clamp(i64::from(i32::MIN), i64::from(i32::MAX)) as i32
-        }))
+        State(sums.map(|sum| i32::try_from(sum >> PHI_FRACTION_BITS).unwrap_or(i32::MAX)))
     }
 
     fn word(&self, index: usize) -> i32 {
-        let at = WORD * index;
-        let bytes = self.bytes.get(at..at + WORD);
-        let word = bytes.and_then(|bytes| bytes.first_chunk::<WORD>());
-        word.map_or(0, |word| i32::from_le_bytes(*word))
+        self.words
+            .get(index)
+            .map_or(0, |word| i32::from_le_bytes(*word))
     }
 }
 
@@ -164,12 +165,11 @@ mod tests {
         for level in told {
             history.push(level);
         }
-        let mut expected = told.iter().rev().copied();
-        for level in history.latest_first() {
-            assert_eq!(Some(level), expected.next());
+        for (before, level) in told.iter().rev().take(64).enumerate() {
+            assert_eq!(history.level(before as u16), *level, "{before}");
         }
         // 64 of the 70 were kept.
-        assert_eq!(expected.count(), 6);
+        assert_eq!(history.level(64), told[6]);
     }
 
     /// Two ticks of delay: Φ = 2 on f, -1/2 from g to f; W = 100; G_1 = 3.5, G_2 = -1/256 on f.
@@ -205,7 +205,7 @@ mod tests {
     }
 
     #[test]
-    fn the_largest_numbers_saturate() {
+    fn what_does_not_fit_lies_in_no_grid() {
         let mut bytes = [0; prediction_len(64)];
         for word in bytes.chunks_exact_mut(4) {
             word.copy_from_slice(&i32::MAX.to_le_bytes());
