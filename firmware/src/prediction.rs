@@ -53,24 +53,26 @@ pub const fn prediction_len(delay_ticks: u16) -> usize {
     LEVELS_AT + WORD * STATES * delay_ticks as usize
 }
 
-/// The levels of the last 64 ticks, as bit planes: bit j of plane b is bit b of the level of j + 1 ticks ago. 40 bytes.
+/// The levels of the last 64 ticks, as bit planes of two words, the later first: bit j of plane b is bit b of the level of j + 1 ticks ago.
+/// 40 bytes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct History {
-    planes: [u64; LEVEL_BITS],
+    planes: [[u32; 2]; LEVEL_BITS],
 }
 
 impl History {
     /// No command is under way.
     pub const NONE: Self = Self {
-        planes: [0; LEVEL_BITS],
+        planes: [[0; 2]; LEVEL_BITS],
     };
 
     /// Notes the level that a tick has decided; it is that of one tick ago from then on. Bits past the fifth are lost.
     #[inline(never)]
     pub fn push(&mut self, level: u8) {
         let mut level = level;
-        for plane in &mut self.planes {
-            *plane = *plane << 1 | u64::from(level & 1);
+        for [later, earlier] in &mut self.planes {
+            *earlier = *earlier << 1 | *later >> 31;
+            *later = *later << 1 | u32::from(level & 1);
             level >>= 1;
         }
     }
@@ -78,10 +80,11 @@ impl History {
     /// The level that was noted last (0), or so many before it; past the 63rd that one.
     #[inline(never)]
     pub fn level(&self, before: u16) -> u8 {
-        let before = before.min(DELAY_TICKS_MAX - 1);
         let mut level = 0;
-        for plane in self.planes.iter().rev() {
-            level = level << 1 | (*plane >> before & 1) as u8;
+        for [later, earlier] in self.planes.iter().rev() {
+            let word = if before < 32 { later } else { earlier };
+            let bit = *word >> (before.min(DELAY_TICKS_MAX - 1) & 31) & 1;
+            level = level << 1 | bit as u8;
         }
         level
     }
@@ -126,14 +129,14 @@ impl<'t> PredictionView<'t> {
     #[must_use]
     #[inline(never)]
     pub fn predict(&self, measured: State, history: &History) -> State {
-        let mut sums = [0i64; STATES];
-        for (row, sum) in sums.iter_mut().enumerate() {
-            *sum = i64::from(self.loss(row)) << PHI_FRACTION_BITS;
+        let mut sums: [i64; STATES] = core::array::from_fn(|row| {
+            let mut sum = i64::from(self.loss(row)) << PHI_FRACTION_BITS;
             for (column, value) in measured.0.iter().enumerate() {
                 let value = (*value).clamp(-MEASURED_MAX, MEASURED_MAX);
-                *sum += i64::from(self.phi(row, column)) * i64::from(value);
+                sum += i64::from(self.phi(row, column)) * i64::from(value);
             }
-        }
+            sum
+        });
         let up = PHI_FRACTION_BITS - LEVEL_FRACTION_BITS;
         for ago in 1..=self.ticks() {
             let level = history.level(ago as u16 - 1);
@@ -221,9 +224,7 @@ mod tests {
             word.copy_from_slice(&i32::MIN.to_le_bytes());
         }
         let view = PredictionView::new(&bytes);
-        assert_eq!(
-            view.predict(State([i32::MAX; 4]), &history).0,
-            [i32::MIN; 4]
-        );
+        let low = view.predict(State([i32::MAX; 4]), &history);
+        assert_eq!(low, State([i32::MAX; 4]));
     }
 }
