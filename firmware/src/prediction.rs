@@ -144,7 +144,7 @@ impl<'t> PredictionView<'t> {
                 continue;
             }
             for (row, sum) in sums.iter_mut().enumerate() {
-                *sum += i64::from(self.level(ago, row)) * i64::from(level) << up;
+                *sum += (i64::from(self.level(ago, row)) * i64::from(level)) << up;
             }
         }
         State(sums.map(|sum| i32::try_from(sum >> PHI_FRACTION_BITS).unwrap_or(i32::MAX)))

@@ -142,7 +142,13 @@ fn trigger_boxes(spec: &Spec) -> Result<Vec<Box4>, DelayError> {
             let last: [f64; STATES] = std::array::from_fn(|d| high[d].max(was_high[d]));
             if first[0] < below {
                 // Seen at the first tick below: within a tick's fall of the limit.
-                let fall = (high[0] - low[0]).max(0.0) + tick_s * steepest(spec) * MICRO;
+                // Over a delay the box's extent would count again and again; a tick's own fall is enough.
+                let extent = if delay.is_some() {
+                    0.0
+                } else {
+                    (high[0] - low[0]).max(0.0)
+                };
+                let fall = extent + tick_s * steepest(spec) * MICRO;
                 let mut clipped = first;
                 clipped[0] = first[0].max(below - 2.0 * error[0] - fall);
                 let mut end = last;
