@@ -1,11 +1,13 @@
 //! The product's image for the STM32F405: the charger of [`firmware::charger`] on real pins.
 //!
-//! | pin | use |
-//! |---|---|
-//! | PA0 | zero crossings of the mains, rising (TIM5 channel 1) |
-//! | PA2 | telemetry, 115 200 baud 8N1 (USART2) |
-//! | PA8 | control pilot, 1 kHz (TIM1 channel 1) |
-//! | PB0 | contactor, high closes |
+//! | pin | use | build |
+//! |---|---|---|
+//! | PA0 | zero crossings of the mains, rising (TIM5 channel 1) | unless `ade7953` |
+//! | PA4, PA5, PA6, PA7 | ADE7953: chip select, SCLK, MISO, MOSI (SPI1, mode 3) | feature `ade7953` |
+//! | PA8 | control pilot, 1 kHz (TIM1 channel 1) | unless `bidirectional` |
+//! | PB0 | contactor, high closes | unless `bidirectional` |
+//! | PA8 | signed power set-point, 1 kHz (TIM1 channel 1), see [`firmware::dispatch::power_line`] | feature `bidirectional` |
+//! | PA2 | telemetry, 115 200 baud 8N1 (USART2) | always |
 //!
 //! One loop, no interrupts: the timer captures a crossing in hardware, and the loop comes round far more often than the
 //! 20 ms until the next. The watchdog bites after four ticks without a completed one, and a panic ends in it too.
@@ -19,13 +21,8 @@ use panic_halt as _;
 use cortex_m_rt::entry;
 use embedded_hal_nb::serial::Write as _;
 use firmware::charger::{Charger, ChargerConfig, Watchdog};
-use firmware::dispatch::Limits;
-use firmware::dispatch::contactor::ContactorTimes;
-use firmware::dispatch::fleet::Threshold;
-use firmware::dispatch::unidirectional::Unidirectional;
 use firmware::fault::ResetCause;
 use firmware::flash;
-use firmware::frequency::zero_crossing::ZeroCrossing;
 use firmware::telemetry::{FRAME_MAX, Frame, TableId, encode};
 use stm32f4xx_hal::pac;
 use stm32f4xx_hal::prelude::*;
@@ -33,9 +30,14 @@ use stm32f4xx_hal::rcc::Config;
 use stm32f4xx_hal::serial::Serial;
 use stm32f4xx_hal::serial::config::Config as SerialConfig;
 use stm32f4xx_hal::signature::Uid;
-use stm32f4xx_hal::timer::{CapturePolarity, Flag, Timer};
 use stm32f4xx_hal::watchdog::IndependentWatchdog;
 
+#[cfg_attr(feature = "ade7953", path = "holdfast/ade7953.rs")]
+#[cfg_attr(not(feature = "ade7953"), path = "holdfast/zero_crossing.rs")]
+mod source;
+#[cfg_attr(feature = "bidirectional", path = "holdfast/power_line.rs")]
+#[cfg_attr(not(feature = "bidirectional"), path = "holdfast/pilot.rs")]
+mod stage;
 #[path = "table_region.rs"]
 mod table_region;
 
@@ -47,20 +49,10 @@ static TABLE: [u8; include_bytes!(concat!(env!("OUT_DIR"), "/table.bin")).len()]
 
 /// Crystal of the board \[MHz\].
 const CRYSTAL_MHZ: u32 = 25;
-/// Tolerance of the crystal \[ppm\].
-const CRYSTAL_PPM: u16 = 20;
 /// Core and timer clock \[MHz\].
 const CORE_MHZ: u32 = 84;
-/// Timers of the crossings and of the clock \[Hz\]; divides the timer clock.
-const TIMER_HZ: u32 = 1_000_000;
-/// Mains cycles a frequency is averaged over: 100 ms.
-const CYCLES: u8 = 5;
-/// What socket and cable bear \[mA\].
-const CABLE_MA: u32 = 32_000;
 /// Longest time without a completed tick \[ms\].
 const WATCHDOG_MS: u32 = 400;
-
-const _: () = assert!((CORE_MHZ * 1_000_000).is_multiple_of(TIMER_HZ));
 
 /// The independent watchdog, which runs on its own oscillator.
 struct Dog(IndependentWatchdog);
@@ -130,39 +122,31 @@ fn run(peripherals: pac::Peripherals) {
     let port_a = peripherals.GPIOA.split(&mut rcc);
     let port_b = peripherals.GPIOB.split(&mut rcc);
 
-    let timer = Timer::new(peripherals.TIM5, &mut rcc);
-    let (crossings, (channel, ..)) = timer.capture_hz(TIMER_HZ.Hz());
-    let mut crossing = channel.with(port_a.pa0);
-    crossing.set_polarity(CapturePolarity::ActiveHigh);
-    crossing.enable();
-
-    let timer = Timer::new(peripherals.TIM1, &mut rcc);
-    let (_, (channel, ..)) = timer.pwm_hz(firmware::dispatch::pilot::PILOT_HZ.Hz());
-    let mut pilot = channel.with(port_a.pa8);
-    // No charging until the first tick has decided.
-    pilot.set_duty(pilot.get_max_duty());
-    pilot.enable();
-    let contactor = port_b.pb0.into_push_pull_output();
+    #[cfg(feature = "ade7953")]
+    let pins = (
+        peripherals.SPI1,
+        port_a.pa4,
+        port_a.pa5,
+        port_a.pa6,
+        port_a.pa7,
+    );
+    #[cfg(not(feature = "ade7953"))]
+    let pins = (peripherals.TIM5, port_a.pa0);
+    let source = source::new(pins, &mut rcc);
+    let pins = (peripherals.TIM1, port_a.pa8, port_b.pb0);
+    let dispatch = stage::new(pins, serial_number(), &mut rcc);
 
     let baud = SerialConfig::default().baudrate(115_200.bps());
     let line = Serial::tx(peripherals.USART2, port_a.pa2, baud, &mut rcc);
 
     let mut timer = peripherals.TIM2.counter_us(&mut rcc);
     let started = timer.start(u32::MAX.micros());
-    let window = ZeroCrossing::new(TIMER_HZ, CYCLES, CRYSTAL_PPM);
-    let (Ok(mut line), Ok(()), Ok(source)) = (line, started, window) else {
+    let (Ok(mut line), Ok(()), Some((source, mut feed))) = (line, started, source) else {
         return;
     };
 
     let mut dog = IndependentWatchdog::new(peripherals.IWDG);
     dog.start(WATCHDOG_MS.millis());
-    let dispatch = Unidirectional::new(
-        pilot,
-        contactor,
-        ContactorTimes::DEFAULT,
-        Threshold::of_serial(serial_number()),
-        Limits::all(CABLE_MA),
-    );
     let image = flash::image(table_region::bytes());
     let config = ChargerConfig::DEFAULT;
     let mut charger = Charger::new(source, dispatch, Dog(dog), image, config, cause);
@@ -179,10 +163,7 @@ fn run(peripherals: pac::Peripherals) {
     let (mut sent, mut length) = (0, 0);
     loop {
         let now_ms = clock.at(timer.now().ticks());
-        if crossings.flags().contains(Flag::C1) {
-            // Reading the capture register clears its flag.
-            charger.source_mut().capture(crossing.get_capture(), now_ms);
-        }
+        feed.poll(charger.source_mut(), now_ms);
         if now_ms.wrapping_sub(next_ms) < u32::MAX / 2 {
             next_ms = next_ms.wrapping_add(tick_ms);
             let report = charger.tick(now_ms);

@@ -12,89 +12,34 @@
 //! After a start nobody knows the governor chain: the grid may be in the middle of an event. The observer's initial error
 //! dies out with its slowest time constant, so the droop, which needs f alone, is in force for [`trust_ticks`].
 
+mod config;
+mod report;
+
+pub use config::{ChargerConfig, trust_ticks};
+pub use report::Report;
+
 use crate::control_loop::{ControlLoop, Source};
-use crate::dispatch::{Dispatch, SetPoint};
+use crate::dispatch::Dispatch;
 use crate::droop::Droop;
+use crate::event::{Course, EventWatch};
 use crate::fault::{Faults, Mode, ResetCause};
 use crate::frequency::FrequencySource;
 use crate::frequency::filter::Filter;
-use crate::frequency::gate::{Gate, GateLimits};
+use crate::frequency::gate::Gate;
 use crate::observer::{Observer, ObserverConfig};
 use crate::phase::Phase;
-use crate::table::{PlantParameters, TableError, TableView};
+use crate::table::{TableError, TableView};
 use crate::units::{Participation, State};
+use report::log_changes;
 
 /// Most ticks made good by one late tick: longer gaps make the interpolation a guess.
 pub const CATCH_UP_TICKS_MAX: u16 = 5;
 /// Tick without a table \[ms\].
 pub const TICK_MS_DEFAULT: u16 = 100;
-/// Slowest time constants until an initial error of the chain counts as gone: `e^-6` = 0.25 %.
-const TRUST_TIME_CONSTANTS: u64 = 6;
-
-/// Ticks until the observer of this plant is trusted: 72 s for the paper's `T_2` = 12 s.
-pub fn trust_ticks(plant: &PlantParameters, tick_ms: u16) -> u16 {
-    let slowest = plant
-        .governor_time_us
-        .max(plant.lag_time_us)
-        .max(plant.turbine_time_us);
-    let tick_us = u64::from(tick_ms).max(1) * 1000;
-    let ticks = (TRUST_TIME_CONSTANTS * u64::from(slowest)).div_ceil(tick_us);
-    u16::try_from(ticks).unwrap_or(u16::MAX)
-}
-
 /// Feeds the watchdog. Only a completed tick calls it: every step done, and the set-point accepted by the hardware.
 pub trait Watchdog {
     /// Restarts the watchdog's time.
     fn feed(&mut self);
-}
-
-/// Settings of a charger.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct ChargerConfig {
-    /// Which readings are believed.
-    pub gate: GateLimits,
-    /// Ticks of the moving average, 1 for none.
-    pub filter_ticks: u8,
-    /// Ticks without frequency during which the last participation is held.
-    pub hold_ticks: u16,
-    /// Release of the participation per tick once frequency is lost \[ppm\].
-    pub release_ppm: u32,
-    /// Ticks of warm-up; `None` takes [`trust_ticks`].
-    pub warm_up_ticks: Option<u16>,
-}
-
-impl ChargerConfig {
-    /// No filter, 1 s of hold at 100 ms a tick, release over 60 s, warm-up by the plant.
-    pub const DEFAULT: Self = Self {
-        gate: GateLimits::DEFAULT,
-        filter_ticks: 1,
-        hold_ticks: 10,
-        release_ppm: 1_667,
-        warm_up_ticks: None,
-    };
-}
-
-/// What a tick did.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Report {
-    /// Ticks since the start, this one included; saturates.
-    pub sequence: u32,
-    /// The caller's clock \[ms\].
-    pub now_ms: u32,
-    /// Who decided.
-    pub mode: Mode,
-    /// The law in force.
-    pub phase: Phase,
-    /// State estimate.
-    pub state: State,
-    /// Lost power \[kW\], once known.
-    pub loss_kw: Option<i32>,
-    /// Share of the fleet that is to respond.
-    pub participation: Participation,
-    /// What the charger was told; `None` if the hardware refused.
-    pub set_point: Option<SetPoint>,
-    /// What was wrong.
-    pub faults: Faults,
 }
 
 /// A charger: everything between the mains and the car but the hardware.
@@ -107,10 +52,12 @@ pub struct Charger<'t, S, D, W> {
     tick_ms: u16,
     gate: Gate,
     filter: Filter,
-    /// Plant, coefficients, observer; `None` without a table.
-    observer: Option<(PlantParameters, ObserverConfig, Observer)>,
+    /// `None` without a table.
+    observer: Option<Observer>,
     control: ControlLoop<'t>,
     droop: Droop,
+    /// `None` without a table.
+    event: Option<EventWatch>,
     /// Restarted by a fault, and the warm-up that follows is not over.
     restarted: bool,
     warm_up_ticks: u16,
@@ -137,31 +84,40 @@ impl<'t, S: FrequencySource, D: Dispatch, W: Watchdog> Charger<'t, S, D, W> {
     }
 
     /// The same for a table that was parsed already, as where many chargers share one.
+    ///
+    /// Not inlined: what is put together here must not lie on the stack while the table is parsed, which is where the
+    /// stack is deepest.
+    #[inline(never)]
     pub fn with_table(
         source: S,
         dispatch: D,
         watchdog: W,
-        table: Result<TableView<'t>, TableError>,
+        mut table: Result<TableView<'t>, TableError>,
         config: ChargerConfig,
         cause: ResetCause,
     ) -> Self {
-        let (tick_ms, droop, plant) = match &table {
+        let (tick_ms, droop, plant, event) = match &table {
             Ok(view) => {
                 let header = view.header();
-                (header.tick_ms, header.droop, Some(header.plant))
+                let event = EventWatch::new(config.event_end, header.outer, header.tick_ms);
+                (
+                    header.tick_ms,
+                    header.droop,
+                    Some(header.plant),
+                    Some(event),
+                )
             }
-            Err(_) => (TICK_MS_DEFAULT, Droop::PAPER, None),
+            Err(_) => (TICK_MS_DEFAULT, Droop::PAPER, None, None),
         };
         let observer = plant.and_then(|plant| {
             let coefficients = ObserverConfig::new(&plant, tick_ms).ok()?;
-            let observer = Observer::at_rest(coefficients, &plant, 0);
-            Some((plant, coefficients, observer))
+            Some(Observer::at_rest(coefficients, &plant, 0))
         });
         // A chain that is too fast for the tick makes the table as useless as a broken one.
-        let table = match (&observer, table) {
-            (None, Ok(_)) => Err(TableError::BadField { offset: 108 }),
-            (_, table) => table,
-        };
+        let unusable = observer.is_none() && table.is_ok();
+        if unusable {
+            table = Err(TableError::BadField { offset: 108 });
+        }
         let warm_up_ticks = config
             .warm_up_ticks
             .unwrap_or_else(|| plant.map_or(0, |plant| trust_ticks(&plant, tick_ms)));
@@ -182,23 +138,14 @@ impl<'t, S: FrequencySource, D: Dispatch, W: Watchdog> Charger<'t, S, D, W> {
             observer,
             control: ControlLoop::with_table(table),
             droop,
+            event,
             restarted: cause != ResetCause::PowerOn,
             warm_up_ticks,
             warm_up_left: warm_up_ticks,
             lost_ticks: 0,
             last_ms: None,
             f_uhz: 0,
-            last: Report {
-                sequence: 0,
-                now_ms: 0,
-                mode: Mode::WarmUp,
-                phase: Phase::NoControl,
-                state: State::default(),
-                loss_kw: None,
-                participation: Participation::NONE,
-                set_point: None,
-                faults: Faults::NONE,
-            },
+            last: Report::FIRST,
         }
     }
 
@@ -303,8 +250,11 @@ impl<'t, S: FrequencySource, D: Dispatch, W: Watchdog> Charger<'t, S, D, W> {
         self.warm_up_left = self.warm_up_ticks;
         self.filter.reset();
         self.control.reset();
-        if let Some((plant, coefficients, observer)) = &mut self.observer {
-            *observer = Observer::at_rest(*coefficients, plant, self.f_uhz);
+        if let Some(event) = &mut self.event {
+            event.reset();
+        }
+        if let (Some(observer), Some(table)) = (&mut self.observer, self.control.table()) {
+            observer.restart(&table.header().plant, self.f_uhz);
         }
     }
 
@@ -332,7 +282,7 @@ impl<'t, S: FrequencySource, D: Dispatch, W: Watchdog> Charger<'t, S, D, W> {
             let missed = due - 1;
             self.control.skip(missed);
             self.warm_up_left = self.warm_up_left.saturating_sub(missed);
-            self.decide(report);
+            self.decide(due, report);
         }
     }
 
@@ -341,7 +291,7 @@ impl<'t, S: FrequencySource, D: Dispatch, W: Watchdog> Charger<'t, S, D, W> {
         self.f_uhz = f_uhz;
         let acting = self.control.acting(report.participation);
         report.state = match &mut self.observer {
-            Some((_, _, observer)) => {
+            Some(observer) => {
                 let state = observer.step(f_uhz);
                 report.loss_kw = observer.loss_kw(acting);
                 state
@@ -350,8 +300,8 @@ impl<'t, S: FrequencySource, D: Dispatch, W: Watchdog> Charger<'t, S, D, W> {
         };
     }
 
-    /// One tick of the control loop, or of what stands in for it.
-    fn decide(&mut self, report: &mut Report) {
+    /// One tick of the control loop, or of what stands in for it, `due` ticks after the last.
+    fn decide(&mut self, due: u16, report: &mut Report) {
         if self.warm_up_left > 0 {
             self.warm_up_left -= 1;
             report.mode = Mode::WarmUp;
@@ -359,6 +309,20 @@ impl<'t, S: FrequencySource, D: Dispatch, W: Watchdog> Charger<'t, S, D, W> {
             let droop = self.droop.participation(report.state);
             report.participation = self.control.impose(droop);
             return;
+        }
+        let f_uhz = report.state.frequency_uhz();
+        // Still the last tick's participation.
+        let before = report.participation;
+        if let Some(event) = &mut self.event {
+            match event.course(f_uhz, before, due) {
+                Course::Release(participation) => {
+                    report.participation = participation;
+                    report.mode = Mode::Release;
+                    return;
+                }
+                Course::Anew | Course::Over => self.control.reset(),
+                Course::Follow => {}
+            }
         }
         let action = self.control.step(report.state);
         report.participation = action.participation;
@@ -371,6 +335,14 @@ impl<'t, S: FrequencySource, D: Dispatch, W: Watchdog> Charger<'t, S, D, W> {
                 Mode::DroopOutside
             }
         };
+        if let Some(event) = &mut self.event {
+            let responding = action.phase != Phase::NoControl;
+            let covered = action.source == Source::Table;
+            if event.ends(f_uhz, responding, covered, due) {
+                report.participation = before;
+                report.mode = Mode::Release;
+            }
+        }
     }
 
     fn without_frequency(&mut self, due: u16, report: &mut Report) {
@@ -390,34 +362,8 @@ impl<'t, S: FrequencySource, D: Dispatch, W: Watchdog> Charger<'t, S, D, W> {
             report.participation = Participation::from_ppm(ppm);
         }
         report.loss_kw = None;
-        if let Some((_, _, observer)) = &mut self.observer {
+        if let Some(observer) = &mut self.observer {
             observer.reset_loss();
         }
     }
 }
-
-/// Logs what a tick changed: the mode, and faults that came or went.
-#[cfg(feature = "defmt")]
-fn log_changes(before: &Report, now: &Report) {
-    if now.mode != before.mode {
-        defmt::info!(
-            "tick {=u32}: {} -> {}, f {=i32} uHz",
-            now.sequence,
-            before.mode,
-            now.mode,
-            now.state.frequency_uhz()
-        );
-    }
-    for (fault, name) in Faults::NAMES {
-        if now.faults.without(before.faults).contains(fault) {
-            defmt::warn!("tick {=u32}: fault {=str}", now.sequence, name);
-        }
-        if before.faults.without(now.faults).contains(fault) {
-            defmt::info!("tick {=u32}: cleared {=str}", now.sequence, name);
-        }
-    }
-}
-
-/// Without the `defmt` feature nothing is logged; telemetry carries the same.
-#[cfg(not(feature = "defmt"))]
-fn log_changes(_before: &Report, _now: &Report) {}

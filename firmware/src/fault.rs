@@ -100,6 +100,7 @@ impl From<FrequencyError> for Faults {
 /// | `DroopNoTable` | the table was rejected | baseline droop on f, dead band and slope of the paper | restart |
 /// | `Hold` | no believed frequency | the last, held | frequency back, or `hold_ticks` |
 /// | `Safe` | frequency lost for longer | released step by step: ordinary charging | frequency back, then `WarmUp` |
+/// | `Release` | the event is over ([`crate::event`]) | released step by step, standing still while f is low | at zero; f below I1 |
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[repr(u8)]
@@ -116,17 +117,20 @@ pub enum Mode {
     Hold = 4,
     /// Frequency lost: back to ordinary charging.
     Safe = 5,
+    /// The event is over: step by step back to ordinary charging.
+    Release = 6,
 }
 
 impl Mode {
     /// Modes in the order of their numbers.
-    pub const ALL: [Self; 6] = [
+    pub const ALL: [Self; 7] = [
         Self::WarmUp,
         Self::Table,
         Self::DroopOutside,
         Self::DroopNoTable,
         Self::Hold,
         Self::Safe,
+        Self::Release,
     ];
 }
 

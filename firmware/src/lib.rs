@@ -13,6 +13,7 @@
 //! | [`phase`] | state and table | the law in force: No control, C1, C2, Fixed, Hold |
 //! | [`droop`] | a frequency | the baseline participation, used as the fallback |
 //! | [`control_loop`] | one state a tick | one [`control_loop::Action`] a tick |
+//! | [`event`] | f over minutes | the end of an event, and the way back to ordinary charging |
 //! | [`dispatch`] | a participation | this charger's current or power |
 //! | [`charger`] | one reading a tick | all of the above, with a defined [`fault`] state for whatever is missing |
 //! | [`telemetry`] | a tick's report | a frame on a serial line |
@@ -44,6 +45,8 @@ pub mod phase;
 pub mod droop;
 
 pub mod control_loop;
+
+pub mod event;
 
 pub mod dispatch;
 

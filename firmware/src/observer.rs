@@ -140,6 +140,11 @@ impl Observer {
         }
     }
 
+    /// Forgets everything: at rest again, at this deviation \[µHz\].
+    pub fn restart(&mut self, plant: &PlantParameters, f_uhz: i32) {
+        *self = Self::at_rest(self.config, plant, f_uhz);
+    }
+
     /// Takes the frequency deviation measured at this tick \[µHz\] and returns the state estimate.
     pub fn step(&mut self, f_uhz: i32) -> State {
         let f_hz = f_uhz as f32 / MICRO as f32;
@@ -180,7 +185,7 @@ impl Observer {
 #[cfg(test)]
 mod tests {
     use super::bound::{InputError, measurement_bound};
-    use super::reference::{PAPER, advance};
+    use super::reference::advance;
     use super::*;
     use proptest::prelude::*;
 
@@ -200,7 +205,7 @@ mod tests {
     fn rejects_chains_that_the_series_does_not_cover() {
         let plant = PlantParameters {
             turbine_time_us: 24_999,
-            ..PAPER
+            ..PlantParameters::PAPER
         };
         let error = ObserverError::TimeConstantTooShort;
         assert_eq!(ObserverConfig::new(&plant, TICK_MS), Err(error));
@@ -217,16 +222,16 @@ mod tests {
             loss_kw in 0u32..2_200_000,
             participations in proptest::collection::vec(0u32..=1_000_000, 8),
         ) {
-            let config = ObserverConfig::new(&PAPER, TICK_MS).expect("the paper's chain");
-            let mut observer = Observer::at_rest(config, &PAPER, 0);
+            let config = ObserverConfig::new(&PlantParameters::PAPER, TICK_MS).expect("the paper's chain");
+            let mut observer = Observer::at_rest(config, &PlantParameters::PAPER, 0);
             // The fleet may step by all of its power at any tick, the loss at the first: both at ticks, so f' bends
             // nowhere inside one. Imbalance and |l - p| below 4 GW in every such run.
             let input = InputError {
                 reading_uhz: eps as u32 + 1,
-                curvature_uhz_per_s2: InputError::curvature_uhz_per_s2(&PAPER, 4_000_000, 4_000_000),
+                curvature_uhz_per_s2: InputError::curvature_uhz_per_s2(&PlantParameters::PAPER, 4_000_000, 4_000_000),
                 power_step_kw: 0,
             };
-            let bound = measurement_bound(&PAPER, TICK_MS, &input);
+            let bound = measurement_bound(&PlantParameters::PAPER, TICK_MS, &input);
             let (mut x, mut seed, mut error) = ([0.0; 4], seed, 0);
             for tick in 0..600u32 {
                 let u = participations[(tick / 75) as usize];
@@ -249,15 +254,15 @@ mod tests {
             loss_kw in 0u32..2_200_000,
             ppm in 0u32..=1_000_000,
         ) {
-            let config = ObserverConfig::new(&PAPER, TICK_MS).expect("the paper's chain");
-            let mut observer = Observer::at_rest(config, &PAPER, 0);
+            let config = ObserverConfig::new(&PlantParameters::PAPER, TICK_MS).expect("the paper's chain");
+            let mut observer = Observer::at_rest(config, &PlantParameters::PAPER, 0);
             let input = InputError {
                 reading_uhz: eps as u32 + 1,
-                curvature_uhz_per_s2: InputError::curvature_uhz_per_s2(&PAPER, 4_000_000, 4_000_000),
+                curvature_uhz_per_s2: InputError::curvature_uhz_per_s2(&PlantParameters::PAPER, 4_000_000, 4_000_000),
                 power_step_kw: 0,
             };
-            let turbine = measurement_bound(&PAPER, TICK_MS, &input)[3];
-            let bound = LossEstimator::error_kw(&PAPER, TICK_MS, eps as u32 + 1, turbine, 0);
+            let turbine = measurement_bound(&PlantParameters::PAPER, TICK_MS, &input)[3];
+            let bound = LossEstimator::error_kw(&PlantParameters::PAPER, TICK_MS, eps as u32 + 1, turbine, 0);
             let (mut x, mut seed) = ([0.0; 4], seed);
             // The reading before the event, then the event.
             observer.step(0);
@@ -276,8 +281,8 @@ mod tests {
 
         #[test]
         fn any_readings_give_an_estimate(readings in proptest::collection::vec(any::<i32>(), 1..100)) {
-            let config = ObserverConfig::new(&PAPER, TICK_MS).expect("the paper's chain");
-            let mut observer = Observer::at_rest(config, &PAPER, 0);
+            let config = ObserverConfig::new(&PlantParameters::PAPER, TICK_MS).expect("the paper's chain");
+            let mut observer = Observer::at_rest(config, &PlantParameters::PAPER, 0);
             for reading in readings {
                 prop_assert_eq!(observer.step(reading).0[0], reading);
                 let _ = observer.loss_kw(Participation::ALL);
@@ -288,9 +293,10 @@ mod tests {
     #[test]
     fn a_constant_bias_is_a_shift_of_the_loss() {
         // x + b (1, K, K, K) with the loss shifted by (D - K) b: the observer cannot tell the two apart.
-        let config = ObserverConfig::new(&PAPER, TICK_MS).expect("the paper's chain");
+        let config =
+            ObserverConfig::new(&PlantParameters::PAPER, TICK_MS).expect("the paper's chain");
         let bias = 5_000;
-        let mut observer = Observer::at_rest(config, &PAPER, bias);
+        let mut observer = Observer::at_rest(config, &PlantParameters::PAPER, bias);
         let mut x = [0.0; 4];
         let mut loss = None;
         observer.step(bias);

@@ -54,16 +54,7 @@ fn header() -> Header {
             deadband_uhz: 150_000,
             full_uhz: 500_000,
         },
-        plant: PlantParameters {
-            governor_gain_kw_per_hz: -5_000_000,
-            governor_time_us: 2_500_000,
-            turbine_time_us: 500_000,
-            lead_time_us: 2_000_000,
-            lag_time_us: 12_000_000,
-            damping_kw_per_hz: 1_000_000,
-            inertia_kw_s_per_hz: 4_000_000,
-            fleet_kw: 1_400_000,
-        },
+        plant: PlantParameters::PAPER,
         laws: [None; LAWS],
     }
 }

@@ -40,9 +40,10 @@ const SIZES: [(&str, &[&str]); 3] = [
     ),
 ];
 
-#[divan::bench(args = [0, 1, 2], sample_count = 5)]
-fn reach_avoid_c1_and_c2(bencher: Bencher<'_, '_>, size: usize) {
-    let spec = spec(SIZES[size].1);
+#[divan::bench(args = SIZES.map(|(name, _)| name), sample_count = 5)]
+fn reach_avoid_c1_and_c2(bencher: Bencher<'_, '_>, size: &str) {
+    let (_, set) = SIZES.into_iter().find(|(name, _)| *name == size).unwrap();
+    let spec = spec(set);
     let cells = spec.grid.cells();
     bencher
         .counter(ItemsCount::new(cells))

@@ -73,6 +73,7 @@ fn mode_name(mode: u8) -> &'static str {
         Some(Mode::DroopNoTable) => "droop, no table",
         Some(Mode::Hold) => "hold",
         Some(Mode::Safe) => "safe",
+        Some(Mode::Release) => "release",
         None => "?",
     }
 }

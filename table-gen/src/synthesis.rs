@@ -23,7 +23,8 @@ use crate::abstraction::tube::TubeGuard;
 use crate::delay::{Delay, DelayError, known_within};
 use crate::game::bitset::BitSet;
 use crate::game::guard::Guard;
-use crate::game::{GameError, Solution, Watch, reach::reach, safety::safety};
+use crate::game::reach::{may_reach, reach};
+use crate::game::{GameError, LastCells, Solution, Watch, safety::safety};
 use crate::grid_shape::GridShape;
 use crate::interval::Interval;
 use crate::plant::{GridPlant, STATES};
@@ -296,16 +297,25 @@ pub fn synthesise<'w>(
     };
     let hold = if requirements.stay {
         let stay = stay_guard(spec, &grid)?;
+        let mut last = 0;
         let law = solve("Hold", watch, |watch| {
-            safety(&abstraction, &inner, &stay, watch)
+            let watch = LastCells::new(watch);
+            let solution = safety(&abstraction, &inner, &stay, &watch);
+            last = watch.last();
+            solution
         })?;
         if law.solution.winning == 0 {
+            // The last sweep only finds that nothing is left.
+            let periods = law.solution.sweeps.saturating_sub(2);
+            let closest = match last {
+                0 => "none has an input that keeps f there between the samples".to_owned(),
+                _ => format!("{last} came closest, with {periods} periods"),
+            };
             return Err(SynthesisError::NoController {
                 game: "Hold",
                 reason: format!(
-                    "of the {} cells in I2 none can stay there; the last one died in sweep {}",
+                    "requirements.stay fails: of the {} cells in I2 none can stay there for ever; {closest}",
                     inner.count(),
-                    law.solution.sweeps
                 ),
             });
         }
@@ -323,8 +333,11 @@ pub fn synthesise<'w>(
             return Err(SynthesisError::NoController {
                 game: name,
                 reason: format!(
-                    "no cell outside the target's {} can be driven into it",
-                    law.target_cells
+                    "{} fails: no cell outside the target's {} can be driven into it for certain; {} cells came closest, \
+                     with an input that may do so",
+                    goal(name, &kernel),
+                    law.target_cells,
+                    may_reach(&abstraction, target, &avoid),
                 ),
             });
         }
@@ -357,6 +370,16 @@ pub fn synthesise<'w>(
         hold,
         abstraction_cpu_s,
     })
+}
+
+/// The requirement that a reach game is for, by its key.
+fn goal(game: &str, kernel: &Option<BitSet>) -> &'static str {
+    match (game, kernel) {
+        ("C2", None) => "requirements.inner_hz",
+        ("C2", Some(_)) => "requirements.inner_hz with stay",
+        (_, None) => "requirements.outer_hz",
+        (_, Some(_)) => "requirements.outer_hz with stay",
+    }
 }
 
 fn solve<'w>(

@@ -1,4 +1,4 @@
-//! The Arm images: built by cargo, read as ELF, written as BIN and Intel HEX.
+//! The images: built by cargo, read as ELF, written as BIN and Intel HEX.
 
 use std::ffi::OsString;
 use std::fs;
@@ -13,8 +13,6 @@ use crate::root;
 
 /// Target of the images: the reference board's Cortex-M4F.
 pub const TARGET: &str = "thumbv7em-none-eabihf";
-/// Cortex-M0+, without FPU. Its instructions are a subset of the reference board's, so that an image runs there too.
-pub const TARGET_M0: &str = "thumbv6m-none-eabi";
 /// Start of the FLASH region, from memory.x.
 const FLASH: u32 = 0x0800_0000;
 /// Start of the TABLE region, from memory.x.
@@ -25,31 +23,47 @@ const HEX_RECORD: usize = 16;
 /// An image and the features that it needs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Image {
-    /// Name of the binary.
+    /// Name of its files.
     pub name: &'static str,
+    binary: &'static str,
     features: &'static str,
+    log: bool,
 }
 
-/// The product.
-pub const HOLDFAST: Image = Image {
-    name: "holdfast",
-    features: "board",
-};
-/// The product with log lines.
-pub const HOLDFAST_LOG: Image = Image {
-    name: "holdfast",
-    features: "log",
-};
+impl Image {
+    const fn new(name: &'static str, binary: &'static str, features: &'static str) -> Self {
+        Self {
+            name,
+            binary,
+            features,
+            log: false,
+        }
+    }
+
+    /// An image of the product with log lines.
+    #[must_use]
+    pub const fn with_log(self) -> Self {
+        Self { log: true, ..self }
+    }
+}
+
+/// The product: zero crossings on a timer, control pilot and contactor.
+pub const HOLDFAST: Image = Image::new("holdfast", "holdfast", "board");
+/// Every build of the product: each frequency source with each kind of charger.
+pub const PRODUCTS: [Image; 4] = [
+    HOLDFAST,
+    Image::new("holdfast-ade7953", "holdfast", "board,ade7953"),
+    Image::new("holdfast-bidirectional", "holdfast", "board,bidirectional"),
+    Image::new(
+        "holdfast-ade7953-bidirectional",
+        "holdfast",
+        "board,ade7953,bidirectional",
+    ),
+];
 /// Processor in the loop.
-pub const PIL: Image = Image {
-    name: "pil",
-    features: "pil",
-};
+pub const PIL: Image = Image::new("pil", "pil", "pil");
 /// The charger without a HAL, for measuring.
-pub const BARE: Image = Image {
-    name: "bare",
-    features: "bare",
-};
+pub const BARE: Image = Image::new("bare", "bare", "bare");
 
 /// Why an image cannot be built or read.
 #[derive(Debug, thiserror::Error)]
@@ -94,8 +108,13 @@ fn cargo() -> OsString {
 pub fn build(image: Image, target: &str) -> Result<PathBuf, ImageError> {
     let output = Command::new(cargo())
         .args(["build", "--package", "firmware", "--profile", "firmware"])
-        .args(["--target", target, "--bin", image.name])
+        .args(["--target", target, "--bin", image.binary])
         .args(["--features", image.features])
+        .args(if image.log {
+            &["--features", "log"][..]
+        } else {
+            &[]
+        })
         .args(["--message-format", "json-render-diagnostics"])
         .current_dir(root())
         .stdin(Stdio::null())
@@ -109,7 +128,7 @@ pub fn build(image: Image, target: &str) -> Result<PathBuf, ImageError> {
     String::from_utf8_lossy(&output.stdout)
         .lines()
         .filter_map(|line| serde_json::from_str::<serde_json::Value>(line).ok())
-        .filter(|message| message["target"]["name"] == image.name)
+        .filter(|message| message["target"]["name"] == image.binary)
         .find_map(|message| Some(PathBuf::from(message["executable"].as_str()?)))
         .ok_or(failed)
 }

@@ -11,18 +11,6 @@ use firmware::table::{
 };
 use firmware::units::{Band, STATES};
 
-/// The paper's plant with the bidirectional fleet.
-pub const PLANT: PlantParameters = PlantParameters {
-    governor_gain_kw_per_hz: -5_000_000,
-    governor_time_us: 2_500_000,
-    turbine_time_us: 500_000,
-    lead_time_us: 2_000_000,
-    lag_time_us: 12_000_000,
-    damping_kw_per_hz: 1_000_000,
-    inertia_kw_s_per_hz: 4_000_000,
-    fleet_kw: 1_400_000,
-};
-
 /// Input levels: steps of 5 %.
 const LEVELS: u8 = 21;
 /// Cells of the grid: f in 0.05 Hz, g, l, p in 0.5 GW.
@@ -62,7 +50,7 @@ fn header(stay: bool) -> Result<Header, GridError> {
             high_uhz: 0,
         },
         droop: Droop::PAPER,
-        plant: PLANT,
+        plant: PlantParameters::PAPER,
         laws: [None; LAWS],
     })
 }

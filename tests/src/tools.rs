@@ -19,7 +19,8 @@ const COMPONENTS: &[(&str, &str)] = &[("rustfmt", "fmt"), ("clippy", "clippy")];
 struct Tool {
     /// Names under which it may be found; the first on the search path will do.
     programs: &'static [&'static str],
-    /// Debian packages that bring it. Recommended packages are left out, so name what it cannot do without.
+    /// Debian packages that bring it. Recommended packages are left out, so name what it cannot do without. Of `a|b` the first
+    /// that the system's release has is taken.
     packages: &'static [&'static str],
     /// Why it is needed.
     why: &'static str,
@@ -31,6 +32,11 @@ const TOOLS: &[Tool] = &[
         programs: &["qemu-system-arm"],
         packages: &["qemu-system-arm"],
         why: "runs the firmware on an emulated Cortex-M4",
+    },
+    Tool {
+        programs: &["qemu-system-riscv32"],
+        packages: &["qemu-system-riscv|qemu-system-misc"],
+        why: "runs the firmware on an emulated RISC-V core",
     },
     Tool {
         programs: &["chromium", "chromium-browser", "google-chrome"],
@@ -90,25 +96,40 @@ fn install(missing: &[&Tool]) -> Result<(), Failure> {
     for tool in missing {
         println!("    {} is missing: it {}", tool.programs[0], tool.why);
     }
-    let packages: Vec<&str> = missing
-        .iter()
-        .flat_map(|tool| tool.packages)
-        .copied()
-        .collect();
-    let Some(prefix) = administrator() else {
-        return Err(cannot_install(missing, &packages));
+    let packages = || -> Vec<&str> {
+        let all = missing.iter().flat_map(|tool| tool.packages);
+        all.map(|choice| of_this_release(choice)).collect()
     };
-    println!("    installing {} with apt-get", packages.join(", "));
+    let Some(prefix) = administrator() else {
+        return Err(cannot_install(missing, &packages()));
+    };
     let apt_get = |words: &[&str]| {
         let (program, rest) = (prefix[0], &prefix[1..]);
         run(Command::new(program).args(rest).arg("apt-get").args(words))
     };
     apt_get(&["update"])?;
+    let packages = packages();
+    println!("    installing {} with apt-get", packages.join(", "));
     apt_get(&[&["install", "-y", "--no-install-recommends"], &*packages].concat())?;
     match missing.iter().find(|tool| !tool.is_installed()) {
         None => Ok(()),
-        Some(tool) => Err(cannot_install(&[tool], tool.packages)),
+        Some(tool) => {
+            let packages: Vec<&str> = tool.packages.iter().map(|p| of_this_release(p)).collect();
+            Err(cannot_install(&[tool], &packages))
+        }
     }
+}
+
+/// The package of `a|b` that the package lists know; the last if none is known.
+fn of_this_release(choice: &str) -> &str {
+    let known = |package: &&str| {
+        answer("apt-cache", &["show", package]).is_some_and(|text| !text.is_empty())
+    };
+    choice
+        .split('|')
+        .find(known)
+        .or_else(|| choice.split('|').next_back())
+        .unwrap_or(choice)
 }
 
 /// How to call apt-get without being asked anything; `None` where there is no apt-get or no right to use it.
@@ -149,6 +170,8 @@ mod tests {
         assert!(
             text.contains("apt-get install -y --no-install-recommends qemu-system-arm chromium")
         );
-        assert!(text.contains("missing: qemu-system-arm, chromium"));
+        assert!(text.contains("missing: qemu-system-arm, qemu-system-riscv32, chromium"));
+        // Where no list knows either, the last is named.
+        assert_eq!(of_this_release("no-such-package|nor-this"), "nor-this");
     }
 }

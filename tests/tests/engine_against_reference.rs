@@ -15,16 +15,29 @@ use tests::reference::SlowGame;
 
 const D: usize = 3;
 
-/// A random stable-ish plant with enough authority that games are neither empty nor full.
-fn games() -> impl Strategy<Value = (SlowGame, [usize; 2], u64)> {
+/// A random plant: stable or not quite, unstable, or singular (a row of zeros: a pure integrator of the drive).
+fn plants() -> impl Strategy<Value = DMatrix<f64>> {
     let entries = proptest::collection::vec(-0.6f64..0.6, D * D);
+    let shift = prop_oneof![2 => Just(-0.5), 1 => Just(0.0), 1 => Just(0.6)];
+    let zero = prop_oneof![2 => Just(None), 1 => (0..D).prop_map(Some)];
+    (entries, shift, zero).prop_map(|(entries, shift, zero)| {
+        let mut a = DMatrix::from_row_slice(D, D, &entries) + DMatrix::identity(D, D) * shift;
+        if let Some(row) = zero {
+            a.row_mut(row).fill(0.0);
+        }
+        a
+    })
+}
+
+/// A random plant with enough authority that games are neither empty nor full.
+fn games() -> impl Strategy<Value = (SlowGame, [usize; 2], u64)> {
     let drive = proptest::collection::vec(-1.0f64..1.0, D);
     let counts = proptest::array::uniform3(4usize..11);
     let widths = proptest::array::uniform3(0.15f64..0.35);
     let spread = prop_oneof![Just(0.0), 0.0f64..0.1];
     let error = prop_oneof![Just(0.0), 0.0f64..0.03];
     (
-        entries,
+        plants(),
         drive,
         counts,
         widths,
@@ -37,7 +50,6 @@ fn games() -> impl Strategy<Value = (SlowGame, [usize; 2], u64)> {
     )
         .prop_map(
             |(a, b, counts, widths, period, spread, error, inputs, first, seed)| {
-                let a = DMatrix::from_row_slice(D, D, &a) - DMatrix::identity(D, D) * 0.5;
                 let drives = (0..inputs)
                     .map(|u| (2.0 * u as f64 / (inputs - 1) as f64 - 1.013, spread))
                     .collect();

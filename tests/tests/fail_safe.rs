@@ -14,6 +14,7 @@ use firmware::fault::{Faults, Mode, ResetCause};
 use firmware::frequency::{FrequencyError, FrequencySource, Reading};
 use firmware::link::session::{Session, Wires};
 use firmware::link::{Mains, Pins, Request, Response, Setup, SourceKind};
+use firmware::table::PlantParameters;
 use firmware::telemetry::Frame;
 use firmware::units::{Participation, State};
 use tests::stand_in;
@@ -290,7 +291,7 @@ fn a_brown_out_in_mid_event_droops_until_the_observer_is_trusted() {
     };
     let mut bench = Bench::new(&wires, &table, setup);
     // Six times T_2 = 12 s, at ten ticks a second.
-    let ticks = trust_ticks(&stand_in::PLANT, 100);
+    let ticks = trust_ticks(&PlantParameters::PAPER, 100);
     assert_eq!(ticks, 720);
     for _ in 0..ticks {
         let frame = bench.run(-450_000, 1);

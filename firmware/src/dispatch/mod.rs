@@ -2,12 +2,13 @@
 //!
 //! A participation u asks the fleet to give up the share u of what it can give up. A unidirectional charger lowers its
 //! current through the control pilot ([`unidirectional`]), a bidirectional one moves its power from charging towards
-//! discharging ([`bidirectional`]). Limits from other sources (user, site, cable) are applied last and always win.
+//! discharging ([`bidirectional`], [`power_line`]). Limits from other sources (user, site, cable) are applied last and always win.
 
 pub mod bidirectional;
 pub mod contactor;
 pub mod fleet;
 pub mod pilot;
+pub mod power_line;
 pub mod unidirectional;
 
 use crate::units::Participation;

@@ -101,7 +101,6 @@ pub fn measurement_bound(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::observer::reference::PAPER;
 
     #[test]
     fn the_papers_plant_has_a_gain_of_five() {
@@ -111,7 +110,7 @@ mod tests {
             power_step_kw: 0,
         };
         // 2 mHz, and a µHz for each of two terms rounded up: 5 * 2.002 mHz = 10.01 MW, and the f32 rounding.
-        let bound = measurement_bound(&PAPER, 100, &exact);
+        let bound = measurement_bound(&PlantParameters::PAPER, 100, &exact);
         assert_eq!(bound, [2_000, 10_110, 10_110, 10_110]);
     }
 
@@ -119,7 +118,7 @@ mod tests {
     fn a_lead_longer_than_both_lags_overshoots() {
         let plant = PlantParameters {
             lead_time_us: 24_000_000,
-            ..PAPER
+            ..PlantParameters::PAPER
         };
         let exact = InputError {
             reading_uhz: 1_998,
@@ -135,13 +134,14 @@ mod tests {
     fn between_samples_of_the_papers_event() {
         // |l - p| < 1 GW, imbalance 2 GW: (1/0.5 + 1 * 2/8)/8 = 0.28 Hz/s², 0.35 mHz over a tick of 0.1 s;
         // the loss of 2 GW inside a tick: 0.25 Hz/s * 0.1 s / 4 = 6.25 mHz.
-        let curvature = InputError::curvature_uhz_per_s2(&PAPER, 1_000_000, 2_000_000);
+        let curvature =
+            InputError::curvature_uhz_per_s2(&PlantParameters::PAPER, 1_000_000, 2_000_000);
         assert_eq!(curvature, 281_251);
         let input = InputError {
             reading_uhz: 0,
             curvature_uhz_per_s2: curvature,
             power_step_kw: 2_000_000,
         };
-        assert_eq!(input.eps_uhz(&PAPER, 100), 352 + 6_251);
+        assert_eq!(input.eps_uhz(&PlantParameters::PAPER, 100), 352 + 6_251);
     }
 }

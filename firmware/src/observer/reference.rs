@@ -1,19 +1,5 @@
 //! The grid in f64 by Runge-Kutta steps of 1 ms: the truth that the observer's tests compare with.
 
-use crate::table::PlantParameters;
-
-/// Plant of the paper's Table I with the bidirectional fleet.
-pub(crate) const PAPER: PlantParameters = PlantParameters {
-    governor_gain_kw_per_hz: -5_000_000,
-    governor_time_us: 2_500_000,
-    turbine_time_us: 500_000,
-    lead_time_us: 2_000_000,
-    lag_time_us: 12_000_000,
-    damping_kw_per_hz: 1_000_000,
-    inertia_kw_s_per_hz: 4_000_000,
-    fleet_kw: 1_400_000,
-};
-
 fn slope(x: [f64; 4], fleet_gw: f64, loss_gw: f64) -> [f64; 4] {
     let [f, g, l, p] = x;
     let g_dot = (-5.0 * f - g) / 2.5;

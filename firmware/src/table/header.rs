@@ -116,6 +116,20 @@ pub struct PlantParameters {
     pub fleet_kw: u32,
 }
 
+impl PlantParameters {
+    /// The paper's Table I with the bidirectional fleet.
+    pub const PAPER: Self = Self {
+        governor_gain_kw_per_hz: -5_000_000,
+        governor_time_us: 2_500_000,
+        turbine_time_us: 500_000,
+        lead_time_us: 2_000_000,
+        lag_time_us: 12_000_000,
+        damping_kw_per_hz: 1_000_000,
+        inertia_kw_s_per_hz: 4_000_000,
+        fleet_kw: 1_400_000,
+    };
+}
+
 /// The header of a table, decoded.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Header {

@@ -16,6 +16,9 @@
 //! **Errors of the estimate.** The cell that the controller sees may differ from the real state by e on each axis. The
 //! real state before the step lies in the cell widened by e; the estimate after it in the successor widened by e again.
 
+mod blocks;
+
+use self::blocks::BlockTables;
 use super::{Abstraction, BlockCore, BlockExtents, CellBox, Extents};
 use crate::flow::{Flow, Matrix, Vector, absolute_integral, metzler};
 use crate::grid_shape::GridShape;
@@ -85,7 +88,7 @@ pub enum AbstractionError {
     },
     /// A successor that the fixed point cannot hold: the plant is too unstable for the step.
     #[error(
-        "a successor lies {cells:.3e} cells away on axis {axis}, more than {INDEX_MAX:.0}: the plant grows too fast for this period"
+        "a successor lies {cells:.3e} cells away on axis {axis}, more than {INDEX_MAX:.0}: the plant grows too fast for this period; shorten the period or widen the cells"
     )]
     Overflow {
         /// The axis.
@@ -131,12 +134,7 @@ pub struct AffineAbstraction<const D: usize> {
     modes: Vec<Mode<D>>,
     steps: Vec<Step<D>>,
     extents: Extents<D>,
-    block: [u32; D],
-    core: Option<[u32; D]>,
-    hull: [u32; D],
-    hull_of_all: [u32; D],
-    /// Lowest offset and highest end (offset plus span) over all inputs; meaningful with one mode.
-    ends_of_all: [(i64, i64); D],
+    blocks: BlockTables<D>,
 }
 
 impl<const D: usize> AffineAbstraction<D> {
@@ -220,13 +218,9 @@ impl<const D: usize> AffineAbstraction<D> {
             modes,
             steps,
             extents,
-            block: [1; D],
-            core: None,
-            hull: [1; D],
-            hull_of_all: [1; D],
-            ends_of_all: [(0, 0); D],
+            blocks: BlockTables::single(),
         };
-        abstraction.choose_block();
+        abstraction.choose_blocks();
         Ok(abstraction)
     }
 
@@ -238,98 +232,6 @@ impl<const D: usize> AffineAbstraction<D> {
             radius[d] = step.span[d] as f64 / ONE / 2.0 * self.shape.width[d];
         }
         radius
-    }
-
-    /// Grows blocks along the axis that moves the successors least, as long as all cells of a block still share part of
-    /// their boxes under every input: a block whose shared part is not won needs no look at its cells.
-    fn choose_block(&mut self) {
-        const BLOCK_CELLS_MAX: u32 = 64;
-        let mut block = [1u32; D];
-        loop {
-            let mut best: Option<(f64, usize)> = None;
-            for axis in 0..D {
-                let mut grown = block;
-                grown[axis] *= 2;
-                if grown[axis] > self.shape.count[axis].next_power_of_two()
-                    || grown.iter().product::<u32>() > BLOCK_CELLS_MAX
-                {
-                    continue;
-                }
-                let margin = self.core_margin(grown);
-                if margin >= 0.5 && best.is_none_or(|(other, _)| margin > other) {
-                    best = Some((margin, axis));
-                }
-            }
-            match best {
-                Some((_, axis)) => block[axis] *= 2,
-                None => break,
-            }
-        }
-        self.block = block;
-        for mode in &mut self.modes {
-            mode.travel = mode.travel_over(block);
-        }
-        let mut core = [u32::MAX; D];
-        let mut hull = [0u32; D];
-        for step in &self.steps {
-            for d in 0..D {
-                let (down, up) = self.modes[step.mode].travel[d];
-                let shared = step.span[d] - (up - down);
-                core[d] = if shared < 0 {
-                    0
-                } else {
-                    core[d].min((shared >> FRACTION_BITS) as u32 + 1)
-                };
-                let all = step.span[d] + (up - down);
-                hull[d] = hull[d].max((all >> FRACTION_BITS) as u32 + 2);
-            }
-        }
-        self.core = core.iter().all(|n| *n > 0).then_some(core);
-        for d in 0..D {
-            hull[d] = hull[d].min(self.shape.count[d]);
-        }
-        self.hull = hull;
-        for d in 0..D {
-            let low = self.steps.iter().map(|step| step.offset[d]).min();
-            let high = self.steps.iter().map(|s| s.offset[d] + s.span[d]).max();
-            let (low, high) = (low.unwrap_or(0), high.unwrap_or(0));
-            self.ends_of_all[d] = (low, high);
-            let (down, up) = self.modes[0].travel[d];
-            let cells = ((high - low + up - down) >> FRACTION_BITS) as u32 + 2;
-            // Modes differ in their tables: with more than one, the hull of all is the grid.
-            self.hull_of_all[d] = if self.modes.len() == 1 {
-                cells.min(self.shape.count[d])
-            } else {
-                self.shape.count[d]
-            };
-        }
-    }
-
-    /// Smallest extent, in cells, of the part that the boxes of a block of this shape share; negative if none.
-    fn core_margin(&self, block: [u32; D]) -> f64 {
-        let mut margin = f64::INFINITY;
-        for step in &self.steps {
-            let travel = self.modes[step.mode].travel_over(block);
-            for d in 0..D {
-                let (down, up) = travel[d];
-                margin = margin.min((step.span[d] - (up - down)) as f64 / ONE);
-            }
-        }
-        margin
-    }
-
-    /// A range of cells on an axis, moved into the grid and widened to a fixed size; `None` if it misses the grid.
-    #[inline]
-    fn clipped(&self, axis: usize, (lowest, highest): (i64, i64), size: u32) -> Option<(u32, u32)> {
-        let count = i64::from(self.shape.count[axis]);
-        if size == self.shape.count[axis] {
-            return Some((0, size - 1));
-        }
-        if highest < 0 || lowest >= count {
-            return None;
-        }
-        let low = lowest.clamp(0, count - i64::from(size)) as u32;
-        Some((low, low + size - 1))
     }
 
     /// Table sums of an anchored cell in a mode.
@@ -459,27 +361,6 @@ impl<const D: usize> Mode<D> {
         }
         Ok((offset, span))
     }
-
-    /// Range of the table sums over a block, relative to the block's first cell. A block that the grid cuts short moves
-    /// less; the entries' own rounding is covered by two units an axis.
-    fn travel_over(&self, block: [u32; D]) -> [(i64, i64); D] {
-        let mut travel = [(0i64, 0i64); D];
-        for d in 0..D {
-            for j in 0..D {
-                let table = &self.tables[d][j];
-                let steps = i64::from(block[j] - 1).min(table.len() as i64 - 1);
-                if steps == 0 {
-                    continue;
-                }
-                // Entries are multiples of one slope, each rounded by half a unit and a little: the change between any
-                // two differs from the slope's by less than two units.
-                let change = table[steps as usize] - table[0];
-                travel[d].0 += change.min(0) - 2;
-                travel[d].1 += change.max(0) + 2;
-            }
-        }
-        travel
-    }
 }
 
 /// A number of cells in fixed point, rounded to nearest.
@@ -534,67 +415,36 @@ impl<const D: usize> Abstraction<D> for AffineAbstraction<D> {
     }
 
     fn block(&self) -> [u32; D] {
-        self.block
+        self.blocks.block
+    }
+
+    fn group(&self) -> [u32; D] {
+        self.blocks.group
     }
 
     fn block_extents(&self) -> Option<BlockExtents<D>> {
-        Some(BlockExtents {
-            core: self.core,
-            hull: self.hull,
-            hull_of_all: self.hull_of_all,
-        })
+        Some(self.blocks.extents)
+    }
+
+    #[inline]
+    fn group_hull(&self, first: &AffineAnchor<D>) -> Option<CellBox<D>> {
+        self.hull_of_all(first, &self.blocks.group_travel, &self.blocks.extents.group)
     }
 
     #[inline]
     fn block_hull(&self, first: &AffineAnchor<D>, input: Option<usize>) -> Option<CellBox<D>> {
-        let (mode, size) = match input {
-            None => (0, &self.hull_of_all),
-            Some(input) => (self.steps[input].mode, &self.hull),
-        };
-        let sums = self.sums_of(first, mode);
-        let mut hull = CellBox {
-            low: [0; D],
-            high: [0; D],
-        };
-        for d in 0..D {
-            let (low, high) = match input {
-                None => self.ends_of_all[d],
-                Some(input) => {
-                    let step = &self.steps[input];
-                    (step.offset[d], step.offset[d] + step.span[d])
-                }
-            };
-            let (down, up) = self.modes[mode].travel[d];
-            let lowest = (sums[d] + low + down) >> FRACTION_BITS;
-            let highest = (sums[d] + high + up) >> FRACTION_BITS;
-            (hull.low[d], hull.high[d]) = self.clipped(d, (lowest, highest), size[d])?;
+        match input {
+            Some(input) => self.hull_of_input(first, input),
+            None => self.hull_of_all(
+                first,
+                &self.modes[0].travel,
+                &self.blocks.extents.hull_of_all,
+            ),
         }
-        Some(hull)
     }
 
     #[inline]
     fn block_core(&self, first: &AffineAnchor<D>, input: usize) -> BlockCore<D> {
-        let Some(extent) = &self.core else {
-            return BlockCore::Unknown;
-        };
-        let step = &self.steps[input];
-        let sums = self.sums_of(first, step.mode);
-        let (mut low, mut high) = ([0u32; D], [0u32; D]);
-        let mut inside = true;
-        for d in 0..D {
-            // Every box of the block starts at or below the first's start plus the travel upwards, and is that much longer
-            // than the core.
-            let (_, up) = self.modes[step.mode].travel[d];
-            let from = (sums[d] + step.offset[d] + up) >> FRACTION_BITS;
-            let to = from + i64::from(extent[d]) - 1;
-            inside &= from >= 0 && to < i64::from(self.shape.count[d]);
-            low[d] = from as u32;
-            high[d] = to as u32;
-        }
-        if inside {
-            BlockCore::Shared(CellBox { low, high })
-        } else {
-            BlockCore::Leaves
-        }
+        self.core_of_input(first, input)
     }
 }

@@ -39,6 +39,8 @@ pub struct BlockExtents<const D: usize> {
     pub hull: [u32; D],
     /// Of the hull over all inputs.
     pub hull_of_all: [u32; D],
+    /// Of the hull of a group over all inputs.
+    pub group: [u32; D],
 }
 
 /// How the successor boxes of an abstraction vary in size.
@@ -92,8 +94,19 @@ pub trait Abstraction<const D: usize>: Sync {
         Some(CellBox { low: [0; D], high })
     }
 
-    /// Sizes of the boxes that [`Abstraction::block_core`] and [`Abstraction::block_hull`] answer with, if each has one size
-    /// for all blocks and inputs.
+    /// Cells on each axis of the groups for which [`Abstraction::group_hull`] answers: a multiple of
+    /// [`Abstraction::block`] on every axis.
+    fn group(&self) -> [u32; D] {
+        self.block()
+    }
+
+    /// As [`Abstraction::block_hull`] over all inputs, for a group.
+    fn group_hull(&self, first: &Self::Anchor) -> Option<CellBox<D>> {
+        self.block_hull(first, None)
+    }
+
+    /// Sizes of the boxes that [`Abstraction::block_core`] and the hulls answer with, if each has one size for all blocks
+    /// and inputs.
     fn block_extents(&self) -> Option<BlockExtents<D>> {
         None
     }

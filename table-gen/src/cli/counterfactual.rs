@@ -1,14 +1,11 @@
 //! `counterfactual TRACE.csv SPEC`: a recorded event with the fleet responding.
 
-use std::path::PathBuf;
-
 use firmware::table::TableView;
 use serde::Serialize;
 
-use super::{Failure, OutputArgs, Overrides, output, plot, progress};
+use super::trace::TraceArgs;
+use super::{Failure, OutputArgs, output, plot};
 use crate::counterfactual::{self, Counterfactual, LIMITS, PlantAnswer, Question};
-use crate::pipeline;
-use crate::replay::trace;
 
 /// Most draws of the disturbance.
 const DRAWS_MAX: usize = 100_000;
@@ -16,14 +13,8 @@ const DRAWS_MAX: usize = 100_000;
 /// Arguments of `counterfactual`.
 #[derive(Debug, clap::Args)]
 pub(super) struct CounterfactualArgs {
-    /// Recorded frequency: CSV with columns dtm,f or utc_time,frequency_hz
-    #[arg(value_name = "TRACE.csv")]
-    trace: PathBuf,
-    /// Name of a shipped spec, or path of a TOML file
-    #[arg(value_name = "SPEC")]
-    spec: String,
     #[command(flatten)]
-    overrides: Overrides,
+    trace: TraceArgs,
     #[command(flatten)]
     output: OutputArgs,
     /// Powers of the fleet to try [GW]
@@ -46,12 +37,6 @@ pub(super) struct CounterfactualArgs {
     /// Seed of the draws
     #[arg(long, value_name = "N", default_value_t = 0)]
     seed: u64,
-    /// Table to run, instead of synthesising one; it must be of this spec
-    #[arg(long, value_name = "FILE")]
-    table: Option<PathBuf>,
-    /// Hold the last sample over gaps up to this long [s]
-    #[arg(long, value_name = "SECONDS")]
-    fill_gaps: Option<f64>,
     /// Draw the frequency with the largest fleet in the terminal
     #[arg(long)]
     plot: bool,
@@ -97,12 +82,9 @@ impl CounterfactualArgs {
 
 /// Runs the command.
 pub(super) fn run(args: &CounterfactualArgs) -> Result<(), Failure> {
-    let spec = args.overrides.load(&args.spec)?;
+    let spec = args.trace.spec()?;
     let question = args.question()?;
-    super::replay::check_gaps(args.fill_gaps)?;
-    let trace = trace::read(&args.trace, args.fill_gaps).map_err(Failure::bad)?;
-    progress::catch_interrupts();
-    let bytes = pipeline::table_bytes(&spec, args.table.as_deref(), &progress::watch)?;
+    let (trace, bytes) = args.trace.load(&spec)?;
     let table =
         TableView::parse(&bytes).map_err(|error| Failure::BadInput(format!("{error:?}")))?;
     let found = counterfactual::answer(&spec, &table, &trace, &question).map_err(Failure::bad)?;

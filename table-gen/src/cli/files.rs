@@ -10,6 +10,10 @@ pub(super) fn write_all(dir: &Path, files: &[(&str, &[u8])]) -> Result<(), Failu
     let fail = |path: &Path, error: std::io::Error| {
         Failure::BadInput(format!("{}: {error}", path.display()))
     };
+    if progress::interrupted() {
+        return Err(interruption());
+    }
+    let new = !dir.exists();
     std::fs::create_dir_all(dir).map_err(|error| fail(dir, error))?;
     // In the target's own folder, so that the moves stay on one file system.
     let staging = tempfile::Builder::new()
@@ -21,11 +25,20 @@ pub(super) fn write_all(dir: &Path, files: &[(&str, &[u8])]) -> Result<(), Failu
         std::fs::write(&path, bytes).map_err(|error| fail(&path, error))?;
     }
     if progress::interrupted() {
-        return Err(Failure::No("interrupted; nothing was written".to_owned()));
+        drop(staging);
+        if new {
+            // Fails only if someone else put something there: then it is not ours to remove.
+            let _ = std::fs::remove_dir(dir);
+        }
+        return Err(interruption());
     }
     for (name, _) in files {
         let to = dir.join(name);
         std::fs::rename(staging.path().join(name), &to).map_err(|error| fail(&to, error))?;
     }
     Ok(())
+}
+
+fn interruption() -> Failure {
+    Failure::No("interrupted; nothing was written".to_owned())
 }

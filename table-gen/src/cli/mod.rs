@@ -11,6 +11,7 @@ mod files;
 mod fleet;
 mod formula;
 mod inspect;
+mod keys;
 mod monitor;
 mod monte_carlo;
 mod output;
@@ -20,6 +21,8 @@ mod replay;
 mod report;
 mod simulate;
 mod synth;
+mod time_left;
+mod trace;
 mod verify;
 
 use std::process::ExitCode;
@@ -64,6 +67,8 @@ enum Command {
     Budget(budget::BudgetArgs),
     /// What is in a table: header, levels, jumps between neighbours, slices
     Inspect(inspect::InspectArgs),
+    /// Every key of a spec: unit, default, what is allowed
+    Keys(keys::KeysArgs),
 }
 
 /// The spec and what overrides it.
@@ -179,6 +184,7 @@ pub fn run() -> ExitCode {
         Command::Monitor(args) => monitor::run(&args),
         Command::Budget(args) => budget::run(&args),
         Command::Inspect(args) => inspect::run(&args),
+        Command::Keys(args) => keys::run(&args),
     };
     match result {
         Ok(()) => ExitCode::SUCCESS,

@@ -5,30 +5,18 @@ use std::path::PathBuf;
 use firmware::table::TableView;
 use serde::Serialize;
 
-use super::{Failure, OutputArgs, Overrides, output, plot, progress, simulate};
-use crate::pipeline;
-use crate::replay::{Replay, replay, trace};
+use super::trace::TraceArgs;
+use super::{Failure, OutputArgs, output, plot, simulate};
+use crate::replay::{Replay, replay};
 use crate::simulation::trajectory::PhaseSpan;
 
 /// Arguments of `replay`.
 #[derive(Debug, clap::Args)]
 pub(super) struct ReplayArgs {
-    /// Recorded frequency: CSV with columns dtm,f or utc_time,frequency_hz
-    #[arg(value_name = "TRACE.csv")]
-    trace: PathBuf,
-    /// Name of a shipped spec, or path of a TOML file
-    #[arg(value_name = "SPEC")]
-    spec: String,
     #[command(flatten)]
-    overrides: Overrides,
+    trace: TraceArgs,
     #[command(flatten)]
     output: OutputArgs,
-    /// Table to run, instead of synthesising one; it must be of this spec
-    #[arg(long, value_name = "FILE")]
-    table: Option<PathBuf>,
-    /// Hold the last sample over gaps up to this long [s]
-    #[arg(long, value_name = "SECONDS")]
-    fill_gaps: Option<f64>,
     /// Write time, frequency and participation of every tick as CSV
     #[arg(long, value_name = "FILE")]
     csv: Option<PathBuf>,
@@ -53,11 +41,8 @@ struct ReplayReport<'r> {
 
 /// Runs the command.
 pub(super) fn run(args: &ReplayArgs) -> Result<(), Failure> {
-    let spec = args.overrides.load(&args.spec)?;
-    check_gaps(args.fill_gaps)?;
-    let trace = trace::read(&args.trace, args.fill_gaps).map_err(Failure::bad)?;
-    progress::catch_interrupts();
-    let bytes = pipeline::table_bytes(&spec, args.table.as_deref(), &progress::watch)?;
+    let spec = args.trace.spec()?;
+    let (trace, bytes) = args.trace.load(&spec)?;
     let table =
         TableView::parse(&bytes).map_err(|error| Failure::BadInput(format!("{error:?}")))?;
     let result = replay(&table, &trace)
@@ -117,16 +102,6 @@ pub(super) fn run(args: &ReplayArgs) -> Result<(), Failure> {
         output::line(plot::frequency(&points, &simulate::levels_hz(&spec)));
     }
     Ok(())
-}
-
-/// The option `--fill-gaps` in its range.
-pub(super) fn check_gaps(fill_gaps_s: Option<f64>) -> Result<(), Failure> {
-    match fill_gaps_s {
-        Some(longest) if !(longest.is_finite() && longest > 0.0) => Err(Failure::BadInput(
-            format!("--fill-gaps = {longest} is out of range: finite, above 0 s"),
-        )),
-        _ => Ok(()),
-    }
 }
 
 fn write_csv(path: &std::path::Path, result: &Replay) -> Result<(), Failure> {

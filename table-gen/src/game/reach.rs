@@ -1,16 +1,11 @@
 //! Reach and reach-avoid: the least fixed point, with worst-case ranks and every allowed input.
 
-use rayon::prelude::*;
-
 use super::bitset::BitSet;
 use super::blocks::{Blocks, Dirty, Filter};
 use super::guard::Guard;
 use super::inclusion::Inclusion;
 use super::{GameError, NOT_WON, SWEEPS_MAX, Solution, Sweep, Watch};
 use crate::abstraction::Abstraction;
-
-/// Blocks that one task of a sweep handles.
-const BLOCKS_PER_TASK: usize = 256;
 
 /// Cells that a task of a sweep won, and the blocks they are in.
 #[derive(Debug, Default)]
@@ -46,9 +41,8 @@ pub fn reach<const D: usize, A: Abstraction<D>>(
         ranks[index] = 0;
     }
     let mut masks = vec![0u32; cells];
-    let mut open = open_cells(&blocks, |index| {
-        !target.contains(index) && !avoid.contains(index)
-    });
+    let mut open = blocks.count_cells(|index| !target.contains(index) && !avoid.contains(index));
+    let can_be_won: usize = open.iter().map(|cells| usize::from(*cells)).sum();
     let mut winning = 0;
     let mut sweeps = 0u16;
     loop {
@@ -56,50 +50,39 @@ pub fn reach<const D: usize, A: Abstraction<D>>(
             return Err(GameError::SweepLimit);
         }
         sweeps += 1;
-        let dirty = if sweeps == 1 {
-            Dirty::everything()
-        } else {
-            Dirty::after(abstraction, &changed)
-        };
+        // Before the first sweep the target is what changed: a box without a cell of it is not included.
+        let dirty = Dirty::after(abstraction, &changed);
         let filter = Filter::new(abstraction, &won, dirty, true);
         let inclusion = Inclusion::new(abstraction.shape(), &won, abstraction.extents());
-        let tasks = blocks.total().div_ceil(BLOCKS_PER_TASK);
-        let found: Vec<Won> = (0..tasks)
-            .into_par_iter()
-            .map(|task| {
-                let first = task * BLOCKS_PER_TASK;
-                let last = (first + BLOCKS_PER_TASK).min(blocks.total());
-                let mut out = Won::default();
-                for block in first..last {
-                    if open[block] == 0 {
-                        continue;
-                    }
-                    let before = out.cells.len();
-                    let start = blocks.first(block);
-                    let inputs = filter.inputs(abstraction, start);
-                    if inputs == 0 {
-                        continue;
-                    }
-                    blocks.each_cell(start, |cell, index| {
-                        if ranks[index] != NOT_WON || avoid.contains(index) {
-                            return;
-                        }
-                        let mut mask = included(abstraction, &inclusion, cell, inputs);
-                        if mask != 0 {
-                            mask = guard.permitted(cell, mask);
-                        }
-                        if mask != 0 {
-                            out.cells.push((index as u32, mask));
-                        }
-                    });
-                    if out.cells.len() > before {
-                        out.blocks
-                            .push((block as u32, (out.cells.len() - before) as u16));
-                    }
+        let found = blocks.sweep(
+            |first| filter.group(abstraction, first),
+            |block, first, out: &mut Won| {
+                if open[block] == 0 {
+                    return;
                 }
-                out
-            })
-            .collect();
+                let inputs = filter.inputs(abstraction, first);
+                if inputs == 0 {
+                    return;
+                }
+                let before = out.cells.len();
+                blocks.each_cell(first, |cell, index| {
+                    if ranks[index] != NOT_WON || avoid.contains(index) {
+                        return;
+                    }
+                    let mut mask = included(abstraction, &inclusion, cell, inputs);
+                    if mask != 0 {
+                        mask = guard.permitted(cell, mask);
+                    }
+                    if mask != 0 {
+                        out.cells.push((index as u32, mask));
+                    }
+                });
+                let won = out.cells.len() - before;
+                if won > 0 {
+                    out.blocks.push((block as u32, won as u16));
+                }
+            },
+        );
         changed = BitSet::new(cells);
         let mut new = 0;
         for task in &found {
@@ -120,6 +103,7 @@ pub fn reach<const D: usize, A: Abstraction<D>>(
             sweep: sweeps,
             cells: winning,
             changed: new,
+            open: can_be_won - winning,
         };
         if !watch.sweep(&progress) {
             return Err(GameError::Interrupted);
@@ -159,19 +143,36 @@ pub(crate) fn included<const D: usize, A: Abstraction<D>>(
     mask
 }
 
-/// Cells of each block for which the predicate holds.
-pub(super) fn open_cells<const D: usize>(
-    blocks: &Blocks<D>,
-    open: impl Fn(usize) -> bool + Sync,
-) -> Vec<u16> {
-    (0..blocks.total())
-        .into_par_iter()
-        .map(|block| {
-            let mut count = 0u16;
-            blocks.each_cell(blocks.first(block), |_, index| {
-                count += u16::from(open(index));
+/// Of the cells outside `target` and `avoid`, those that have an input under which *some* successor may lie in the target: how
+/// close a game came that wins nothing.
+pub fn may_reach<const D: usize, A: Abstraction<D>>(
+    abstraction: &A,
+    target: &BitSet,
+    avoid: &BitSet,
+) -> usize {
+    let blocks = Blocks::new(abstraction);
+    // A box misses the target if it lies in what the target does not hold.
+    let inclusion = Inclusion::new(
+        abstraction.shape(),
+        &target.complement(),
+        abstraction.extents(),
+    );
+    let found = blocks.sweep(
+        |_| true,
+        |_, first, count: &mut usize| {
+            blocks.each_cell(first, |cell, index| {
+                if target.contains(index) || avoid.contains(index) {
+                    return;
+                }
+                let anchor = abstraction.anchor(cell);
+                let hits = |input| {
+                    abstraction
+                        .successor(&anchor, input)
+                        .is_some_and(|cells| !inclusion.includes(&cells))
+                };
+                *count += usize::from((0..abstraction.inputs()).any(hits));
             });
-            count
-        })
-        .collect()
+        },
+    );
+    found.into_iter().sum()
 }

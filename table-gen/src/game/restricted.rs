@@ -108,6 +108,7 @@ impl<const D: usize, A: Abstraction<D>, G: Guard<D>> Restricted<'_, D, A, G> {
                 sweep: sweeps,
                 cells: winning,
                 changed: new,
+                open: left.iter().map(Vec::len).sum(),
             };
             if !watch.sweep(&progress) {
                 return Err(GameError::Interrupted);

@@ -102,6 +102,26 @@ fn draw(figure: &Figure, root: &Root<'_>) -> Result<(), String> {
             .draw_series([Rectangle::new(corners, edge)])
             .map_err(fail)?;
     }
+    for range in &figure.ranges {
+        let colour = range.colour.rgb();
+        let upper = range.spans.iter().map(|(time, _, high)| (*time, *high));
+        let lower = range.spans.iter().rev().map(|(time, low, _)| (*time, *low));
+        let hull: Vec<(f64, f64)> = upper.chain(lower).collect();
+        chart
+            .draw_series([Polygon::new(hull, colour.mix(0.2).filled())])
+            .map_err(fail)?;
+        let bars = range.spans.iter().map(|(time, low, high)| {
+            PathElement::new([(*time, *low), (*time, *high)], colour.stroke_width(2))
+        });
+        chart.draw_series(bars).map_err(fail)?;
+        // A set may be too narrow to be seen as a bar.
+        let ends = range
+            .spans
+            .iter()
+            .flat_map(|(time, low, high)| [(*time, *low), (*time, *high)]);
+        let dots = ends.map(|end| Circle::new(end, 3, colour.filled()));
+        chart.draw_series(dots).map_err(fail)?;
+    }
     for curve in &figure.curves {
         let style = curve.colour.rgb().stroke_width(2);
         let points = curve.points.iter().copied();
@@ -131,6 +151,14 @@ fn draw_legend(
         let at = name(&curve.name)?;
         let style = curve.colour.rgb().stroke_width(2);
         root.draw(&PathElement::new([(at, 14), (at + 18, 14)], style))?;
+    }
+    for range in &figure.ranges {
+        let at = name(&range.name)?;
+        let corners = [(at + 3, 8), (at + 16, 20)];
+        let fill = range.colour.rgb().mix(0.2).filled();
+        root.draw(&Rectangle::new(corners, fill))?;
+        let bar = [(at + 9, 8), (at + 9, 20)];
+        root.draw(&PathElement::new(bar, range.colour.rgb().stroke_width(2)))?;
     }
     for band in &figure.bands {
         let at = name(&band.name)?;

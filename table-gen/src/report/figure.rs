@@ -54,6 +54,17 @@ pub struct ValueBand {
     pub filled: bool,
 }
 
+/// A set of values over time: what it spans at some times.
+#[derive(Debug, Clone, PartialEq)]
+pub struct RangeOverTime {
+    /// Name in the legend and the data.
+    pub name: String,
+    /// How it is drawn.
+    pub colour: Colour,
+    /// Time \[s\], lowest and highest value, times rising.
+    pub spans: Vec<(f64, f64, f64)>,
+}
+
 /// A chart over time.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Figure {
@@ -77,6 +88,8 @@ pub struct Figure {
     pub stretches: Vec<Stretch>,
     /// Boxes.
     pub bands: Vec<ValueBand>,
+    /// Sets: a bar at each time, joined by a pale area.
+    pub ranges: Vec<RangeOverTime>,
 }
 
 impl Figure {
@@ -87,6 +100,13 @@ impl Figure {
         for curve in &self.curves {
             for (time, value) in &curve.points {
                 let _ = writeln!(out, "curve,{},{time:.3},{value:.6}", curve.name);
+            }
+        }
+        for range in &self.ranges {
+            for (time, low, high) in &range.spans {
+                for value in [low, high] {
+                    let _ = writeln!(out, "set,{},{time:.3},{value:.6}", range.name);
+                }
             }
         }
         for stretch in &self.stretches {

@@ -75,6 +75,7 @@ pub fn fleet(spec: &str, config: &FleetConfig, run: &FleetRun) -> Section {
         ],
         stretches: Vec::new(),
         bands: Vec::new(),
+        ranges: Vec::new(),
     });
     section
 }

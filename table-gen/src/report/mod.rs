@@ -9,10 +9,13 @@
 //! | [`fleet`] | every charger with its own firmware |
 //! | [`limits`] | plants beyond the paper's, and what is outside the proof |
 //! | [`proof`] | verdict, budget, spec and hashes |
-//! | [`palette`], [`chart`] | the drawing |
+//! | [`failure`] | the path that breaks a claim |
+//! | `curves`, [`palette`], [`chart`] | the drawing |
 //! | [`page`] | the page |
 
 pub mod chart;
+mod curves;
+pub mod failure;
 pub mod figure;
 pub mod fleet;
 pub mod limits;
@@ -132,6 +135,9 @@ pub fn render_studies(
     }
     sections.extend(more);
     sections.push(proof::verdict(findings.verdict.as_ref()));
+    if let Some(first) = studies.first() {
+        sections.extend(failure::section(findings.verdict.as_ref(), &first.spec));
+    }
     sections.push(proof::budget(findings.budget.as_ref()));
     sections.extend(studies.iter().map(proof::origin));
     page::render(&title, about, &sections)

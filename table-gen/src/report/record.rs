@@ -82,6 +82,7 @@ pub fn replay(spec: &str, trace: &Trace, replay: &Replay) -> Section {
         curves: frequency,
         stretches: stretches.clone(),
         bands: Vec::new(),
+        ranges: Vec::new(),
     });
     section.figures.push(Figure {
         id: "replay-participation".to_owned(),
@@ -94,6 +95,7 @@ pub fn replay(spec: &str, trace: &Trace, replay: &Replay) -> Section {
         curves: asked,
         stretches,
         bands: Vec::new(),
+        ranges: Vec::new(),
     });
     section
 }
@@ -186,6 +188,7 @@ fn frequency_figure(found: &Counterfactual, plant: &PlantAnswer) -> Figure {
         curves,
         stretches: Vec::new(),
         bands: Vec::new(),
+        ranges: Vec::new(),
     }
 }
 
@@ -220,5 +223,6 @@ fn missing_figure(found: &Counterfactual, plant: &PlantAnswer) -> Figure {
         curves,
         stretches: Vec::new(),
         bands: Vec::new(),
+        ranges: Vec::new(),
     }
 }

@@ -98,13 +98,15 @@ pub enum Allowed {
     Choice(&'static [&'static str]),
     /// A name that is safe in file names and reports.
     Name,
+    /// A formula of temporal logic, or no such key at all.
+    OptionalFormula,
 }
 
 impl Allowed {
     /// Whether the key may be absent with a meaning of its own, rather than standing for its default.
     #[must_use]
     pub fn is_optional(&self) -> bool {
-        matches!(self, Self::OptionalNumber(_))
+        matches!(self, Self::OptionalNumber(_) | Self::OptionalFormula)
     }
 }
 
@@ -122,6 +124,7 @@ impl fmt::Display for Allowed {
                 }
                 Ok(())
             }
+            Self::OptionalFormula => f.write_str("a formula in the supported fragment, or none"),
             Self::Name => write!(
                 f,
                 "1 to {NAME_LEN_MAX} ASCII letters, digits, - _ or ., the first a letter or digit"

@@ -58,6 +58,12 @@ pub struct InitialBox {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct RequirementsSpec {
+    /// The requirements as one formula of temporal logic ([`crate::logic`]); it gives the keys below that it speaks of, and any
+    /// that is given as well must agree. Absent: the keys alone.
+    ///
+    /// Unit: -. Allowed: a formula in the supported fragment, or none. Default: none.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub formula: Option<String>,
     /// f stays at or above this, always; absent: no such claim. The paper's psi_1 has -0.8. Below `outer_hz`.
     ///
     /// Unit: Hz. Allowed: a number from -10 to 0, or none. Default: none.
@@ -91,6 +97,7 @@ pub struct RequirementsSpec {
 impl Default for RequirementsSpec {
     fn default() -> Self {
         Self {
+            formula: None,
             containment_hz: None,
             outer_hz: [-0.30, 0.0],
             inner_hz: [-0.15, 0.0],

@@ -111,6 +111,18 @@ pub enum SpecError {
         /// What the key may hold.
         allowed: String,
     },
+    /// `requirements.formula` is none, or asks for what no game plays.
+    #[error(
+        "{origin}: requirements.formula: found {found:?}: {reason}; allowed: a formula in the supported fragment, or none"
+    )]
+    Formula {
+        /// Where the formula stands.
+        origin: String,
+        /// The formula.
+        found: String,
+        /// What is wrong with it, with the sub-formula.
+        reason: String,
+    },
     /// Two ends in the wrong order.
     #[error("{origin}: {key}: found {found}; allowed: {allowed}")]
     Inverted {
@@ -196,6 +208,7 @@ impl SpecError {
             | Self::Inconsistent { key, .. }
             | Self::EmptyTarget { key, .. }
             | Self::TooManyCells { key, .. } => Some(key),
+            Self::Formula { .. } => Some(super::formula::KEY),
             Self::UnknownSpec { .. }
             | Self::Unreadable { .. }
             | Self::TooLong { .. }

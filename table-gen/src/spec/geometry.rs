@@ -225,9 +225,9 @@ mod tests {
         let error = check_memory(10_000_000, 100 << 20, &origin).unwrap_err();
         assert_eq!(error.key(), Some("grid.width"));
         let message = error.to_string();
-        // 12 bytes for each of ten million cells and 64 MiB.
+        // 24 bytes for each of ten million cells and 16 MiB.
         assert!(
-            message.contains("187108864 bytes") && message.contains("104857600 bytes"),
+            message.contains("256777216 bytes") && message.contains("104857600 bytes"),
             "{message}"
         );
     }

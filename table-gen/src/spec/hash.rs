@@ -11,6 +11,7 @@
 //! | whole number | decimal |
 //! | flag | `true` or `false` |
 //! | name, choice | the characters themselves (a name cannot contain a line break) |
+//! | formula | as it is printed, so that spaces and the choice of words do not matter; without one there is no such line |
 //! | absent | `none` |
 //!
 //! Nothing in it depends on the platform, on the order of keys in the file or on how a number was written there. A new
@@ -20,8 +21,8 @@ use std::fmt::Write as _;
 
 use sha2::{Digest, Sha256};
 
-use super::Spec;
 use super::keys::{KEYS, KeyValue};
+use super::{Spec, formula};
 
 const HEADING: &str = "holdfast-spec-1\n";
 
@@ -37,9 +38,13 @@ impl Spec {
     fn canonical_text(&self) -> String {
         let mut text = HEADING.to_owned();
         for key in KEYS {
+            let value = (key.get)(self);
+            if key.path == formula::KEY && value == KeyValue::Absent {
+                continue;
+            }
             text.push_str(key.path);
             text.push('=');
-            push_value(&mut text, (key.get)(self));
+            push_value(&mut text, value);
             text.push('\n');
         }
         text
@@ -102,7 +107,8 @@ mod tests {
         assert!(text.contains("\nuncertainty.loss_gw=4000000000000000,4000000000000000\n"));
         assert!(text.contains("\nrequirements.containment_hz=none\n"));
         assert!(text.ends_with("\nmethod.between_samples=false\n"));
-        assert_eq!(text.lines().count(), 1 + KEYS.len());
+        // Every key but the formula, which is absent.
+        assert_eq!(text.lines().count(), KEYS.len());
     }
 
     #[test]

@@ -2,14 +2,14 @@
 
 use std::fmt;
 
-use super::Spec;
 use super::allowed::{Allowed, Range};
 use super::claims::Domain;
 use super::grid::{Alignment, MICRO_PER_UNIT};
 use super::plant::Direction;
 use super::sampling::Successor;
+use super::{Spec, formula};
 
-/// One key of the spec, for a listing: `table-gen` prints these as the reference of the spec file.
+/// One key of the spec, for a listing: `table-gen keys` prints these as the reference of the spec file.
 #[derive(Debug, Clone, PartialEq)]
 pub struct KeyDoc {
     /// Dotted path, such as `plant.damping_gw_per_hz`.
@@ -225,8 +225,8 @@ pub(super) const KEYS: &[Key] = &[
     row("grid.alignment", "-", Allowed::Choice(Alignment::NAMES),
         "whether lower and upper are cell centres or cell edges", |s| KeyValue::Text(s.grid.alignment.name())),
 
-    row("input.step", "1", Allowed::Number(Range::closed(0.03, 1.0)),
-        "distance between participations; divides 1", |s| KeyValue::Number(s.input.step)),
+    row("input.step", "1", Allowed::Number(Range::closed(0.001, 1.0)),
+        "distance between participations; divides 1 into at most 31 steps", |s| KeyValue::Number(s.input.step)),
 
     row("sampling.period_s", "s", Allowed::Number(Range::closed(0.001, 3600.0)),
         "sampling time tau of C1, C2 and Hold", |s| KeyValue::Number(s.sampling.period_s)),
@@ -246,6 +246,8 @@ pub(super) const KEYS: &[Key] = &[
     row("uncertainty.initial.upper", STATE_UNIT, STATE,
         "upper corner of the states at the event (f, g, l, p)", |s| KeyValue::Numbers(&s.uncertainty.initial.upper)),
 
+    row(formula::KEY, "-", Allowed::OptionalFormula,
+        "the requirements as temporal logic; gives the keys it speaks of", |s| s.requirements.formula.as_deref().map_or(KeyValue::Absent, KeyValue::Text)),
     row("requirements.containment_hz", "Hz", Allowed::OptionalNumber(Range::closed(-10.0, 0.0)),
         "f never falls below this; absent: no such claim", |s| optional(s.requirements.containment_hz)),
     row("requirements.outer_hz", "Hz", INTERVAL,

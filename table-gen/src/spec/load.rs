@@ -6,7 +6,7 @@ use std::io::{self, Read};
 use toml::Table;
 
 use super::overrides::{Origin, Override};
-use super::{Spec, SpecError, resolve, shipped};
+use super::{Spec, SpecError, formula, resolve, shipped};
 
 /// Longest file that is read: a hundred times the longest shipped spec.
 const FILE_LEN_MAX: u64 = 1 << 20;
@@ -50,6 +50,7 @@ impl Spec {
             resolve::check(&document, &file.with_overrides(&overrides))?;
         }
 
+        formula::expand(&mut document, &file.with_overrides(&overrides))?;
         let spec: Self =
             document
                 .try_into()

@@ -2,19 +2,17 @@
 
 use std::fs;
 
-/// What synthesis holds for each cell: an estimate, above the mask of allowed inputs (4 bytes) and the rank.
-///
-/// With the fixed part it gives 95 MB for the paper's 2.36 million cells, where 84 MB were measured for a solver without
-/// stored transitions.
-const BYTES_PER_CELL: u64 = 12;
+/// What synthesis holds for each cell: mask (4 bytes) and rank (2) of up to three laws, and up to 6 bytes of eroded sets (a
+/// bit each) and of cells that a sweep won. Two laws take 18 to 19 bytes a cell on grids of 11 to 90 million cells.
+const BYTES_PER_CELL: u64 = 24;
 
 /// What synthesis needs on any grid: the program, its buffers and its output.
-const BYTES_FIXED: u64 = 64 << 20;
+const BYTES_FIXED: u64 = 16 << 20;
 
 /// Assumed where the system does not tell.
 const AVAILABLE_BYTES_DEFAULT: u64 = 4 << 30;
 
-/// Estimate in bytes of what synthesis on this many cells needs: 12 bytes a cell and 64 MiB.
+/// Estimate in bytes of what synthesis on this many cells needs: 24 bytes a cell and 16 MiB.
 pub(super) fn needed_bytes(cells: u64) -> u64 {
     cells
         .saturating_mul(BYTES_PER_CELL)
@@ -51,8 +49,8 @@ mod tests {
 
     #[test]
     fn the_estimate_is_linear_and_saturates() {
-        assert_eq!(needed_bytes(0), 64 << 20);
-        assert_eq!(needed_bytes(1_000_000), 12_000_000 + (64 << 20));
+        assert_eq!(needed_bytes(0), 16 << 20);
+        assert_eq!(needed_bytes(1_000_000), 24_000_000 + (16 << 20));
         assert_eq!(needed_bytes(u64::MAX), u64::MAX);
     }
 }

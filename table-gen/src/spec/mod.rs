@@ -8,6 +8,7 @@
 //! | text becomes a table of keys | `load` | syntax, with line and column |
 //! | names and types are checked against the key table | `keys`, `resolve` | unknown key, wrong type |
 //! | `--set KEY=VALUE` replaces single keys | `overrides` | the same, named as an override |
+//! | a formula becomes the keys that say the same | `formula` | syntax, outside the fragment, a key that disagrees |
 //! | missing keys take their defaults | `plant`, `grid`, `sampling`, `claims` | |
 //! | ranges, then relations between keys | `validate`, `geometry`, `memory` | a value or a combination that cannot be |
 //!
@@ -22,6 +23,7 @@
 mod allowed;
 mod claims;
 mod error;
+mod formula;
 mod geometry;
 mod grid;
 mod hash;

@@ -86,8 +86,10 @@ impl Override {
         let value = match key {
             Some(key) if raw == REMOVE && key.allowed.is_optional() => None,
             _ if raw == REMOVE => return Err(not_optional(text, path)),
-            // A name such as 2024 needs no quotes either.
-            Some(key) if matches!(key.allowed, Allowed::Name) => Some(parse_name(raw)),
+            // A name such as 2024 and a formula such as true need no quotes either.
+            Some(key) if matches!(key.allowed, Allowed::Name | Allowed::OptionalFormula) => {
+                Some(parse_name(raw))
+            }
             _ => Some(parse_value(raw)),
         };
         Ok(Self {
@@ -149,7 +151,7 @@ fn not_optional(text: &str, path: &str) -> SpecError {
         origin: format!("--set {text}"),
         key: path.to_owned(),
         allowed,
-        optional: optional.join(" and "),
+        optional: optional.join(", "),
     }
 }
 

@@ -50,7 +50,7 @@ fn check_value(key: &'static Key, value: &Value, origin: &Origin) -> Result<(), 
         }
         (Allowed::Integer { .. }, Value::Integer(_)) => true,
         (Allowed::Flag, Value::Boolean(_)) => true,
-        (Allowed::Choice(_) | Allowed::Name, Value::String(_)) => true,
+        (Allowed::Choice(_) | Allowed::Name | Allowed::OptionalFormula, Value::String(_)) => true,
         _ => false,
     };
     if !right_type {

@@ -9,7 +9,7 @@ pub struct InputSpec {
     /// Distance between participations; must divide 1, with at most 32 levels (the allowed inputs of a cell are a mask
     /// of 32 bits). The paper's "Symbolic Control for the Grid".
     ///
-    /// Unit: 1. Allowed: a number from 0.03 to 1. Default: 0.05.
+    /// Unit: 1. Allowed: a number from 0.001 to 1. Default: 0.05.
     pub step: f64,
 }
 

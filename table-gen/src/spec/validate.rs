@@ -7,7 +7,7 @@ use super::keys::{KEYS, Key, KeyValue};
 use super::overrides::Origin;
 use super::sampling::{to_ms, to_whole_ms};
 use super::{
-    InputSpec, RequirementsSpec, SamplingSpec, Spec, SpecError, UncertaintySpec, geometry,
+    InputSpec, RequirementsSpec, SamplingSpec, Spec, SpecError, UncertaintySpec, formula, geometry,
 };
 
 /// The allowed inputs of a cell are a mask of 32 bits.
@@ -40,7 +40,8 @@ impl Spec {
         check_requirements(&self.requirements, origin)?;
         geometry::check_grid(&self.grid, origin)?;
         geometry::check_initial(self, origin)?;
-        geometry::check_targets(self, origin)
+        geometry::check_targets(self, origin)?;
+        formula::check(self, origin)
     }
 }
 

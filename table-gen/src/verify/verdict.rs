@@ -98,6 +98,8 @@ pub struct RealPath {
     pub adversary: String,
     /// One point for every change of the law or the level, and the last one.
     pub points: Vec<RealPoint>,
+    /// Time from the event \[s\] and f \[Hz\], at the event and at every tick.
+    pub frequency: Vec<[f64; 2]>,
 }
 
 /// A point of a real trajectory.

@@ -7,6 +7,7 @@ use super::replay::{Adversary, Breach, Replay, Sample};
 use super::tally::Violation;
 use super::verdict::{RealPath, RealPoint};
 use crate::plant::STATES;
+use firmware::units::AXIS_F;
 
 /// Moments of the event that are tried where nothing else is uncertain.
 const MOMENTS: u32 = 4000;
@@ -134,5 +135,9 @@ pub(crate) fn real_path(breach: Breach, samples: &[Sample], adversary: &str) -> 
         initial: samples.first().map_or([0.0; 4], |s| s.x.map(|v| v / 1e6)),
         adversary: adversary.to_owned(),
         points,
+        frequency: samples
+            .iter()
+            .map(|sample| [sample.time_s, sample.x[AXIS_F] / 1e6])
+            .collect(),
     }
 }

@@ -1,16 +1,18 @@
-//! `cargo fw`: the Arm images, built, run in QEMU and measured.
+//! `cargo fw`: the images, built, run in QEMU and measured.
 //!
 //! Exit codes: 0 done; 1 host and target differ, or a figure is past its goal; 2 bad input or a missing tool.
 
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
+use std::time::Instant;
 
 use clap::{Parser, Subcommand};
 use firmware::link::session::{Session, Wires};
 use firmware::link::{Request, Setup, SourceKind};
 use table_gen::replay::trace;
 use tests::costs::{self, CostError};
-use tests::images::{self, Elf, HOLDFAST, HOLDFAST_LOG, PIL};
+use tests::images::{self, Elf, PIL, PRODUCTS};
+use tests::pil::machine::{self, Machine};
 use tests::pil::qemu::Target;
 use tests::pil::run::{Outcome, Pair, closed_loop, recorded};
 use tests::pil::scenario;
@@ -21,7 +23,7 @@ const RECORDED: &str = "../shared/data/gb-frequency-2019-08-09.csv";
 /// The table that the images carry.
 const TABLE: &str = "firmware/tables/paper-bi.bin";
 
-/// The Arm images of Holdfast: built, run in QEMU, measured.
+/// The images of Holdfast: built, run in QEMU, measured.
 #[derive(Debug, Parser)]
 #[command(name = "fw", max_term_width = 110)]
 struct Cli {
@@ -31,12 +33,12 @@ struct Cli {
 
 #[derive(Debug, Subcommand)]
 enum Command {
-    /// Build both images, print their sizes, write ELF, BIN and HEX (the default)
+    /// Build the images, print their sizes, write ELF, BIN and HEX (the default)
     Images {
         /// Folder for the files
         #[arg(long, default_value = "out/firmware")]
         out: PathBuf,
-        /// Build the product with log lines over the debug probe
+        /// Build the product's images with log lines over the debug probe
         #[arg(long)]
         log: bool,
     },
@@ -51,9 +53,9 @@ enum Command {
         /// Table; the shipped one, or one made by hand if none is shipped
         #[arg(long)]
         table: Option<PathBuf>,
-        /// Build the image for Cortex-M0+, where floating point is software
-        #[arg(long)]
-        soft_float: bool,
+        /// The core
+        #[arg(long, value_enum, default_value_t = Core::M4)]
+        core: Core,
     },
     /// Measure flash, RAM, stack and instructions, and compare with firmware/expected
     Costs {
@@ -61,6 +63,27 @@ enum Command {
         #[arg(long)]
         bless: bool,
     },
+}
+
+/// The cores that the pil image runs on.
+#[derive(Debug, Clone, Copy, clap::ValueEnum)]
+enum Core {
+    /// Cortex-M4F, the reference board
+    M4,
+    /// Code for Cortex-M0+, where floating point is software
+    M0,
+    /// RV32IMC, without floating point and without atomics
+    Riscv,
+}
+
+impl Core {
+    const fn machine(self) -> Machine {
+        match self {
+            Self::M4 => machine::CORTEX_M4,
+            Self::M0 => machine::CORTEX_M0,
+            Self::Riscv => machine::RISCV,
+        }
+    }
 }
 
 type AnyError = Box<dyn std::error::Error>;
@@ -76,15 +99,8 @@ fn main() -> ExitCode {
             scenarios,
             ticks,
             table,
-            soft_float,
-        } => {
-            let target = if soft_float {
-                images::TARGET_M0
-            } else {
-                images::TARGET
-            };
-            processor_in_the_loop(scenarios, ticks.max(1), table.as_deref(), target)
-        }
+            core,
+        } => processor_in_the_loop(scenarios, ticks.max(1), table.as_deref(), core.machine()),
         Command::Costs { bless } => measure(bless),
     };
     match result {
@@ -102,8 +118,8 @@ fn main() -> ExitCode {
 }
 
 fn build_images(out: &Path, log: bool) -> Result<(), AnyError> {
-    let product = if log { HOLDFAST_LOG } else { HOLDFAST };
-    for image in [product, PIL] {
+    let products = PRODUCTS.map(|image| if log { image.with_log() } else { image });
+    for image in products.into_iter().chain([PIL]) {
         let elf = Elf::read(&images::build(image, images::TARGET)?)?;
         println!("{}", image.name);
         for section in elf.sections()? {
@@ -142,11 +158,12 @@ fn processor_in_the_loop(
     scenarios: u64,
     ticks: u32,
     table: Option<&Path>,
-    target: &str,
+    machine: Machine,
 ) -> Result<(), AnyError> {
     let table = table_bytes(table)?;
-    let image = images::build(PIL, target)?;
-    let mut target = Target::start(&image, &table, false)?;
+    let image = images::build(PIL, machine.target)?;
+    let started = Instant::now();
+    let mut target = Target::start(machine, &image, &table, false)?;
     let wires = Wires::default();
     let mut host = Session::new(&wires, &table);
     if let Some(reason) = host.table_error() {
@@ -157,6 +174,8 @@ fn processor_in_the_loop(
         let outcome = closed_loop(&mut pair, &scenario::event(bidirectional))?;
         tell("the paper's event", &outcome);
     }
+    let outcome = closed_loop(&mut pair, &scenario::recovery())?;
+    tell("the same to its end", &outcome);
     replay(&mut pair)?;
     let mut sum: Option<Outcome> = None;
     for n in 0..scenarios {
@@ -169,7 +188,11 @@ fn processor_in_the_loop(
     }
     let agreed = pair.agreed;
     target.ask(&Request::Stop)?;
-    println!("{agreed} answers, the image and the host equal to the bit");
+    println!(
+        "{agreed} answers in {:.1} s, {} and the host equal to the bit",
+        started.elapsed().as_secs_f64(),
+        machine.name
+    );
     Ok(())
 }
 
@@ -205,10 +228,10 @@ fn replay(pair: &mut Pair<'_, '_>) -> Result<(), AnyError> {
 }
 
 fn tell(what: &str, outcome: &Outcome) {
-    let [warm_up, table, outside, none, hold, safe] = outcome.modes;
+    let [warm_up, table, outside, none, hold, safe, release] = outcome.modes;
     println!(
         "{what}: lowest {:.3} Hz, participation up to {:.3}, faults {:#06x}; ticks: {warm_up} warm-up, \
-         {table} table, {outside} outside, {none} no table, {hold} hold, {safe} safe",
+         {table} table, {outside} outside, {none} no table, {hold} hold, {safe} safe, {release} release",
         50.0 + outcome.lowest_hz,
         outcome.most,
         outcome.faults

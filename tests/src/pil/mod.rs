@@ -1,5 +1,6 @@
 //! Processor in the loop: the `pil` image in QEMU, the same session on the host, and a grid between them.
 
+pub mod machine;
 pub mod mains;
 pub mod qemu;
 pub mod run;

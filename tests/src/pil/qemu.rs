@@ -1,4 +1,4 @@
-//! The `pil` image in QEMU's STM32F405 board, behind two FIFOs.
+//! The `pil` image on an emulated board, behind two FIFOs.
 //!
 //! The image opens `to-target` and `to-host` by semihosting in QEMU's working folder, a temporary one. When QEMU ends, a
 //! thread opens both FIFOs once more, so that a host that waits on one of them gets an error instead of waiting for ever.
@@ -9,12 +9,11 @@ use std::path::Path;
 use std::process::{Child, Command, Stdio};
 use std::thread;
 
+use super::machine::Machine;
 use firmware::link::{
     self, FRAME_MAX, LENGTH_LEN, LinkError, Reply, Request, decode, record_length,
 };
 
-/// Start of the TABLE region, from memory.x.
-const TABLE_ADDRESS: &str = "0x080E0000";
 /// Virtual time of one instruction is 2^6 ns.
 pub const ICOUNT_SHIFT: u32 = 6;
 /// Core clock of the emulated board \[MHz\].
@@ -59,11 +58,16 @@ pub struct Target {
 
 impl Target {
     /// Starts QEMU with the image and the table's bytes in the TABLE region. `count` makes the clock follow the
-    /// instructions executed.
+    /// instructions executed (Arm).
     ///
     /// # Errors
     /// QEMU or `mkfifo` is missing, or the image does not open its files.
-    pub fn start(image: &Path, table: &[u8], count: bool) -> Result<Self, PilError> {
+    pub fn start(
+        machine: Machine,
+        image: &Path,
+        table: &[u8],
+        count: bool,
+    ) -> Result<Self, PilError> {
         let folder = tempfile::tempdir().map_err(io_error("temporary folder"))?;
         let table_file = folder.path().join("table.bin");
         std::fs::write(&table_file, table).map_err(io_error("table.bin"))?;
@@ -79,23 +83,24 @@ impl Target {
                 }
             });
         made.map_err(io_error("mkfifo"))?;
-        let mut qemu = Command::new("qemu-system-arm");
-        qemu.args(["-machine", "netduinoplus2", "-display", "none"])
-            .args(["-monitor", "none", "-serial", "none"])
+        let mut qemu = Command::new(machine.qemu);
+        qemu.args(machine.board)
+            .args(["-display", "none", "-monitor", "none", "-serial", "none"])
             .args(["-semihosting-config", "enable=on,target=native"])
             .arg("-kernel")
             .arg(image)
             .arg("-device")
             .arg(format!(
-                "loader,file={},addr={TABLE_ADDRESS},force-raw=on",
-                table_file.display()
+                "loader,file={},addr={},force-raw=on",
+                table_file.display(),
+                machine.table_address
             ))
             .current_dir(folder.path())
             .stdin(Stdio::null());
         if count {
             qemu.args(["-icount", &format!("shift={ICOUNT_SHIFT},sleep=off")]);
         }
-        let child = qemu.spawn().map_err(io_error("qemu-system-arm"))?;
+        let child = qemu.spawn().map_err(io_error(machine.qemu))?;
         let [to_target, to_host] = fifos;
         let ends = [to_target.clone(), to_host.clone()];
         thread::spawn(move || release(child, &ends));

@@ -1,7 +1,9 @@
 //! Host and target in lock step: the same requests, answers compared to the bit, the target's answer closing the loop.
 
+use firmware::fault::Mode;
 use firmware::link::session::Session;
 use firmware::link::{Request, Response, Setup};
+use firmware::table::PlantParameters;
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 use table_gen::plant::GridPlant;
@@ -10,7 +12,6 @@ use table_gen::simulation::propagator::Propagator;
 use super::mains::MainsModel;
 use super::qemu::{PilError, Target};
 use super::scenario::{Fault, Scenario};
-use crate::stand_in;
 
 /// The same session on both processors.
 pub struct Pair<'s, 'w> {
@@ -68,7 +69,7 @@ pub struct Outcome {
     /// Largest participation.
     pub most: f64,
     /// Ticks by mode's number.
-    pub modes: [u32; 6],
+    pub modes: [u32; Mode::ALL.len()],
     /// All faults seen.
     pub faults: u16,
 }
@@ -77,7 +78,7 @@ impl Outcome {
     const NONE: Self = Self {
         lowest_hz: 0.0,
         most: 0.0,
-        modes: [0; 6],
+        modes: [0; Mode::ALL.len()],
         faults: 0,
     };
 
@@ -105,10 +106,10 @@ impl Outcome {
     }
 }
 
-/// The plant that the stand-in table and the paper share.
-fn plant(fleet_gw: f64) -> GridPlant {
+/// The paper's plant with a fleet of this power.
+pub fn plant(fleet_gw: f64) -> GridPlant {
     let micro = |value: u32| f64::from(value) * 1e-6;
-    let table = stand_in::PLANT;
+    let table = PlantParameters::PAPER;
     GridPlant {
         governor_gain: f64::from(table.governor_gain_kw_per_hz) * 1e-6,
         governor_time: micro(table.governor_time_us),
@@ -128,7 +129,7 @@ fn plant(fleet_gw: f64) -> GridPlant {
 pub fn closed_loop(pair: &mut Pair<'_, '_>, scenario: &Scenario) -> Result<Outcome, PilError> {
     const TICK_MS: u32 = 100;
     let tick_s = f64::from(TICK_MS) / 1000.0;
-    let fleet_gw = f64::from(stand_in::PLANT.fleet_kw) * 1e-6;
+    let fleet_gw = f64::from(PlantParameters::PAPER.fleet_kw) * 1e-6;
     let step = Propagator::new(&plant(fleet_gw), tick_s);
     pair.ask(&Request::Start(scenario.setup))?;
     let mut random = Pcg64::seed_from_u64(scenario.seed);

@@ -1,0 +1,48 @@
+//! Settings of a charger, and the time until its observer is trusted.
+
+use crate::event::EventEnd;
+use crate::frequency::gate::GateLimits;
+use crate::table::PlantParameters;
+
+/// Slowest time constants until an initial error of the chain counts as gone: `e^-6` = 0.25 %.
+const TRUST_TIME_CONSTANTS: u64 = 6;
+
+/// Ticks until the observer of this plant is trusted: 72 s for the paper's `T_2` = 12 s.
+pub fn trust_ticks(plant: &PlantParameters, tick_ms: u16) -> u16 {
+    let slowest = plant
+        .governor_time_us
+        .max(plant.lag_time_us)
+        .max(plant.turbine_time_us);
+    let tick_us = u64::from(tick_ms).max(1) * 1000;
+    let ticks = (TRUST_TIME_CONSTANTS * u64::from(slowest)).div_ceil(tick_us);
+    u16::try_from(ticks).unwrap_or(u16::MAX)
+}
+
+/// Settings of a charger.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct ChargerConfig {
+    /// Which readings are believed.
+    pub gate: GateLimits,
+    /// Ticks of the moving average, 1 for none.
+    pub filter_ticks: u8,
+    /// Ticks without frequency during which the last participation is held.
+    pub hold_ticks: u16,
+    /// Release of the participation per tick once frequency is lost \[ppm\].
+    pub release_ppm: u32,
+    /// Ticks of warm-up; `None` takes [`trust_ticks`].
+    pub warm_up_ticks: Option<u16>,
+    /// When an event is over, and how long the way back takes.
+    pub event_end: EventEnd,
+}
+
+impl ChargerConfig {
+    /// No filter, 1 s of hold at 100 ms a tick, release over 60 s, warm-up by the plant, [`EventEnd::DEFAULT`].
+    pub const DEFAULT: Self = Self {
+        gate: GateLimits::DEFAULT,
+        filter_ticks: 1,
+        hold_ticks: 10,
+        release_ppm: 1_667,
+        warm_up_ticks: None,
+        event_end: EventEnd::DEFAULT,
+    };
+}
