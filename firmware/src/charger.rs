@@ -289,10 +289,11 @@ impl<'t, S: FrequencySource, D: Dispatch, W: Watchdog> Charger<'t, S, D, W> {
     /// One tick of the observer.
     fn advance(&mut self, f_uhz: i32, report: &mut Report) {
         self.f_uhz = f_uhz;
+        let acting = self.control.acting(report.participation);
         report.state = match &mut self.observer {
             Some(observer) => {
                 let state = observer.step(f_uhz);
-                report.loss_kw = observer.loss_kw(report.participation);
+                report.loss_kw = observer.loss_kw(acting);
                 state
             }
             None => State([f_uhz, 0, 0, 0]),
@@ -305,7 +306,8 @@ impl<'t, S: FrequencySource, D: Dispatch, W: Watchdog> Charger<'t, S, D, W> {
             self.warm_up_left -= 1;
             report.mode = Mode::WarmUp;
             report.phase = Phase::Fallback;
-            report.participation = self.droop.participation(report.state);
+            let droop = self.droop.participation(report.state);
+            report.participation = self.control.impose(droop);
             return;
         }
         let f_uhz = report.state.frequency_uhz();
@@ -347,6 +349,7 @@ impl<'t, S: FrequencySource, D: Dispatch, W: Watchdog> Charger<'t, S, D, W> {
         self.lost_ticks = self.lost_ticks.saturating_add(due);
         if self.lost_ticks <= self.config.hold_ticks {
             report.mode = Mode::Hold;
+            self.control.hold(due);
             // The chain follows the last frequency; the loss estimate would see a kink that was not there.
             for _ in 0..due {
                 self.advance(self.f_uhz, report);

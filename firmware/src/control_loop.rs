@@ -2,10 +2,15 @@
 //!
 //! The loop never fails: a rejected table or a state that no law covers is answered by the baseline droop, and the
 //! action says so.
+//!
+//! Where the table's commands act with a delay, the loop remembers those that are under way and decides on the predicted state
+//! ([`crate::prediction`]). The memory holds levels; so the droop, too, then answers in whole levels, and the prediction knows exactly what is
+//! under way.
 
 use crate::droop::Droop;
 use crate::phase::{Phase, PhaseState, Step};
-use crate::table::{TableError, TableView};
+use crate::prediction::{DELAY_TICKS_MAX, History};
+use crate::table::{Header, TableError, TableView};
 use crate::units::{Participation, State};
 
 /// Who decided the participation.
@@ -36,6 +41,7 @@ pub struct ControlLoop<'t> {
     table: Result<TableView<'t>, TableError>,
     droop: Droop,
     state: PhaseState,
+    history: History,
 }
 
 impl<'t> ControlLoop<'t> {
@@ -55,6 +61,7 @@ impl<'t> ControlLoop<'t> {
             table,
             droop,
             state: PhaseState::INITIAL,
+            history: History::NONE,
         }
     }
 
@@ -83,11 +90,24 @@ impl<'t> ControlLoop<'t> {
                 source: Source::DroopNoTable,
             };
         };
-        let (next, step) = self.state.step(table, state);
+        let ahead = || match table.prediction() {
+            Some(prediction) => prediction.predict(state, &self.history),
+            None => state,
+        };
+        let (next, step) = self.state.step_ahead(table, state, ahead);
         self.state = next;
         let (participation, source) = match step {
-            Step::Level(level) => (table.header().participation(level), Source::Table),
-            Step::Outside => (self.droop.participation(state), Source::DroopOutside),
+            Step::Level(level) => {
+                let header = table.header();
+                if header.delay_ticks > 0 {
+                    self.history.push(level);
+                }
+                (header.participation(level), Source::Table)
+            }
+            Step::Outside => {
+                let droop = self.droop.participation(state);
+                (self.impose(droop), Source::DroopOutside)
+            }
         };
         Action {
             participation,
@@ -96,14 +116,59 @@ impl<'t> ControlLoop<'t> {
         }
     }
 
+    /// Takes note of a participation for this tick that was decided elsewhere, and returns what is to be commanded: with a delay the
+    /// nearest level of the table, else the same.
+    #[inline(never)]
+    pub fn impose(&mut self, participation: Participation) -> Participation {
+        let Some(header) = self.delayed() else {
+            return participation;
+        };
+        let step = header.input_step_ppm;
+        // With a single level, or steps of nothing, there is nothing else to command.
+        let nearest = (participation.ppm() + step / 2)
+            .checked_div(step)
+            .unwrap_or(0);
+        let level = nearest.min(u32::from(header.levels) - 1) as u8;
+        let commanded = header.participation(level);
+        self.history.push(level);
+        commanded
+    }
+
+    /// The participation that acts until the next tick is decided: with a delay an earlier command, else the last one, which is given.
+    pub fn acting(&self, last: Participation) -> Participation {
+        match self.delayed() {
+            Some(header) => header.participation(self.history.level(header.delay_ticks)),
+            None => last,
+        }
+    }
+
+    /// The header of a table whose commands act late.
+    fn delayed(&self) -> Option<&Header> {
+        let header = self.table.as_ref().ok()?.header();
+        (header.delay_ticks > 0).then_some(header)
+    }
+
     /// Lets the period's clock run on by ticks that nobody measured; a decision that fell due meanwhile is made at the next
     /// [`ControlLoop::step`].
     pub fn skip(&mut self, ticks: u16) {
         self.state.ticks_left = self.state.ticks_left.saturating_sub(ticks);
+        self.hold(ticks);
     }
 
-    /// Forgets the event: back to No control.
+    /// Takes note that the last command was held for ticks at which nothing was decided.
+    #[inline(never)]
+    pub fn hold(&mut self, ticks: u16) {
+        if self.delayed().is_some() {
+            let last = self.history.level(0);
+            for _ in 0..ticks.min(DELAY_TICKS_MAX) {
+                self.history.push(last);
+            }
+        }
+    }
+
+    /// Forgets the event and the commands under way: back to No control.
     pub fn reset(&mut self) {
         self.state = PhaseState::INITIAL;
+        self.history = History::NONE;
     }
 }

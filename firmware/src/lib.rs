@@ -9,6 +9,7 @@
 //! | [`observer`] | measured frequency | the grid state (f, g, l, p) |
 //! | [`grid`] | a state | a cell, by the only quantiser there is |
 //! | [`table`] | a cell | an input level, or "outside" |
+//! | [`prediction`] | a state and the commands under way | the state in which a command begins to act |
 //! | [`phase`] | state and table | the law in force: No control, C1, C2, Fixed, Hold |
 //! | [`droop`] | a frequency | the baseline participation, used as the fallback |
 //! | [`control_loop`] | one state a tick | one [`control_loop::Action`] a tick |
@@ -36,6 +37,8 @@ pub mod observer;
 pub mod grid;
 
 pub mod table;
+
+pub mod prediction;
 
 pub mod phase;
 

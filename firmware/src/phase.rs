@@ -65,18 +65,35 @@ impl PhaseState {
     /// Advances by one tick with the state measured at it; pure, so that the verifier can call it on any state.
     #[must_use]
     pub fn step(self, table: &TableView<'_>, state: State) -> (Self, Step) {
+        self.step_ahead(table, state, || state)
+    }
+
+    /// The same where commands act with a delay: No control watches the `measured` state; every other phase and every decision go by the
+    /// state `ahead`, in which the command begins to act ([`crate::prediction`]). `ahead` is called only if the tick needs it.
+    #[must_use]
+    pub fn step_ahead(
+        self,
+        table: &TableView<'_>,
+        measured: State,
+        ahead: impl FnOnce() -> State,
+    ) -> (Self, Step) {
         let header = table.header();
         match self.phase {
             // Chargers can only answer a fall: above I1 there is nothing to do before the event.
-            Phase::NoControl if state.frequency_uhz() >= header.outer.low_uhz => {
+            Phase::NoControl if measured.frequency_uhz() >= header.outer.low_uhz => {
                 (self, Step::Level(self.level))
             }
-            Phase::Fixed if header.inner.contains(state) => (self, Step::Level(self.level)),
             Phase::C1 | Phase::C2 | Phase::Hold if self.ticks_left > 0 => {
                 let ticks_left = self.ticks_left - 1;
                 (Self { ticks_left, ..self }, Step::Level(self.level))
             }
-            _ => self.decide(table, state),
+            _ => {
+                let state = ahead();
+                if self.phase == Phase::Fixed && header.inner.contains(state) {
+                    return (self, Step::Level(self.level));
+                }
+                self.decide(table, state)
+            }
         }
     }
 

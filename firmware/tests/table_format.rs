@@ -6,10 +6,13 @@
     reason = "a test that cannot go on fails"
 )]
 
+use firmware::control_loop::{ControlLoop, Source};
 use firmware::droop::Droop;
 use firmware::grid::{Cell, Grid};
+use firmware::phase::Phase;
+use firmware::prediction::History;
 use firmware::table::*;
-use firmware::units::Band;
+use firmware::units::{Band, State};
 use proptest::prelude::*;
 
 /// A tree over 4 x 3 x 2 x 2 cells: f below 2 gives level 1; else g below 1 gives level 2, else the law.
@@ -38,6 +41,7 @@ fn header() -> Header {
         stay: true,
         tick_ms: 100,
         period_ticks: 15,
+        delay_ticks: 0,
         outer: Band {
             low_uhz: -300_000,
             high_uhz: 0,
@@ -104,7 +108,7 @@ fn header_bytes_are_as_documented() {
     let golden: &[(usize, &[u8])] = &[
         (0, b"HFDT"),
         (4, &[0xFF, 0xFE]),
-        (6, &[1, 0]),
+        (6, &[2, 0]),
         (8, &[241, 0, 0, 0]),
         (12, b"0123456789abcdef"),
         (28, &[0xFC, 0xFF, 0xFF, 0xFF, 0xFD, 0xFF, 0xFF, 0xFF]),
@@ -138,6 +142,83 @@ fn header_bytes_are_as_documented() {
         image[12..HEADER_LEN],
         "what was read is written again"
     );
+}
+
+/// The image with commands that act a tick late: Φ the identity but f falls by g/2; W = 7 on l; G_1 = 256 g a level.
+fn delayed() -> Vec<u8> {
+    let mut words = [0i32; 24];
+    for axis in 0..4 {
+        words[5 * axis] = 1 << 24;
+    }
+    words[1] = -(1 << 23);
+    words[18] = 7;
+    words[21] = 256 << 8;
+    let mut image = image();
+    image[78] = 1;
+    let part = words.iter().flat_map(|word| word.to_le_bytes());
+    image.splice(HEADER_LEN..HEADER_LEN, part);
+    seal(&mut image).unwrap();
+    image
+}
+
+#[test]
+fn the_prediction_lies_between_header_and_blocks() {
+    let image = delayed();
+    assert_eq!(image[76..80], [15, 0, 1, 0]);
+    // Φ_ff = 1 and Φ_fg = -1/2 in 24 bits, W_l, G_1 on g in 8 bits.
+    assert_eq!(image[172..180], [0, 0, 0, 1, 0, 0, 0x80, 0xFF]);
+    assert_eq!(image[244..248], [7, 0, 0, 0]);
+    assert_eq!(image[256..260], [0, 0, 1, 0]);
+    assert_eq!(image[268..297], DOMAIN);
+    let table = TableView::parse(&image).unwrap();
+    assert_eq!(table.header().delay_ticks, 1);
+    assert_eq!(table.lookup(Law::C1, Cell([2, 0, 1, 0])), Some(2));
+    let prediction = table.prediction().unwrap();
+    let mut history = History::NONE;
+    history.push(3);
+    let ahead = prediction.predict(State([10, 4, 0, -1]), &history);
+    assert_eq!(ahead, State([8, 772, 7, -1]));
+    assert!(TableView::parse(&image[..]).is_ok());
+    // Without the delay the same bytes are no table.
+    let mut wrong = image.clone();
+    wrong[78] = 0;
+    seal(&mut wrong).unwrap();
+    assert!(TableView::parse(&wrong).is_err());
+    assert!(
+        TableView::parse(&self::image())
+            .unwrap()
+            .prediction()
+            .is_none()
+    );
+}
+
+#[test]
+fn a_delayed_loop_watches_what_is_and_decides_on_what_will_be() {
+    let image = delayed();
+    let mut control = ControlLoop::new(&image);
+    // I1 ends at -300 000: that f is measured, whatever is predicted.
+    let calm = control.step(State([-300_000, 500_000, 0, 5]));
+    assert_eq!(calm.phase, Phase::NoControl);
+    // Predicted (-1, 0, 7, 5) has no law, so the droop answers, in whole levels: 0.3 Hz is 150 mHz of 500, 6 levels, of which 3 exist.
+    let outside = control.step(State([-300_001, -600_000, 0, 5]));
+    assert_eq!(outside.source, Source::DroopOutside);
+    assert_eq!(outside.participation.ppm(), 150_000);
+    // The three levels under way add 768 to g: predicted (-3, 0, 0, 13) is cell (0, 1, 0, 1), inside C1 by the hull, level 1.
+    let ahead = control.step(State([-3 - 384, -768, -7, 13]));
+    assert_eq!((ahead.phase, ahead.source), (Phase::C1, Source::Table));
+    assert_eq!(ahead.participation.ppm(), 50_000);
+    // For as long as the period runs nothing is looked at.
+    for _ in 0..14 {
+        assert_eq!(control.step(State([9_999_999; 4])).phase, Phase::C1);
+    }
+    // Held by others: what is under way is the same level, 256 on g.
+    control.hold(3);
+    let again = control.step(State([-3 - 128, -256, -7, 13]));
+    assert_eq!((again.phase, again.source), (Phase::C1, Source::Table));
+    control.reset();
+    // Forgotten: without the 256, g lies below the grid.
+    let forgotten = control.step(State([-300_001, -256, -7, 13]));
+    assert_eq!(forgotten.source, Source::DroopOutside);
 }
 
 #[test]
@@ -247,6 +328,7 @@ fn header_fields_out_of_range_are_named_by_their_offset() {
         (74, &[0, 0], 74),
         (76, &[0, 0], 76),
         (78, &[1, 0], 78),
+        (78, &[65, 0], 78),
         (84, &[0, 0, 0, 0x80], 80),
         (92, &[1, 0, 0, 0], 88),
         (100, &[0, 0, 0, 0], 100),

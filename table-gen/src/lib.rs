@@ -9,6 +9,7 @@
 //! | [`interval`], [`flow`] | the equations | enclosures of the flow over a time |
 //! | [`grid_shape`], [`abstraction`] | plant and grid | boxes of successor cells |
 //! | [`game`] | an abstraction and a target | allowed inputs and ranks |
+//! | [`delay`] | a delay of the commands | what the games know then, and the device's prediction |
 //! | [`synthesis`] | a spec | the laws C1, C2, Hold |
 //! | [`compress`] | the laws' freedom | small trees and domains |
 //! | [`emit`] | laws | the bytes of a table |
@@ -33,6 +34,7 @@ pub mod budget;
 pub mod cli;
 pub mod compress;
 pub mod counterfactual;
+pub mod delay;
 pub mod emit;
 pub mod falsify;
 pub mod fleet;

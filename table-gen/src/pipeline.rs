@@ -92,13 +92,13 @@ pub fn emit<'w>(
     encoding: Encoding,
     watch: &dyn Fn(&'static str) -> Box<dyn Watch + 'w>,
 ) -> Result<Emitted, PipelineError> {
-    let header = emit::header(spec, synthesis.grid)?;
+    let head = emit::head(spec, synthesis.grid)?;
     let options = match encoding {
         Encoding::Tree(options) => options,
         Encoding::Dense => {
             let shape = synthesis::grid_shape(&synthesis.grid);
             let encode = |law: &synthesis::SolvedLaw| {
-                dense::encode(&shape, header.levels, &law.solution, &dense::lowest)
+                dense::encode(&shape, head.header.levels, &law.solution, &dense::lowest)
             };
             let laws = [
                 Some(encode(&synthesis.c1)),
@@ -106,14 +106,14 @@ pub fn emit<'w>(
                 synthesis.hold.as_ref().map(encode),
             ];
             return Ok(Emitted {
-                bytes: emit::assemble(header, &laws)?,
+                bytes: emit::assemble(head, &laws)?,
                 laws: Vec::new(),
             });
         }
     };
     let compressed = compress::compress(spec, synthesis, &options, watch)?;
     Ok(Emitted {
-        bytes: emit::assemble(header, &compressed.encoded())?,
+        bytes: emit::assemble(head, &compressed.encoded())?,
         laws: compressed
             .laws
             .into_iter()

@@ -7,7 +7,8 @@
 //! | Hold | safety | stay in whole cells in I2 | `stay = true`; then C2, or C1 if there is no C2, reaches Hold's kernel |
 //!
 //! "Avoid" is every cell of which any part lies below containment. With a measurement error e, the cell is that of the
-//! estimate: the real frequency may lie e outside it, so bands shrink and containment rises by e.
+//! estimate: the real frequency may lie e outside it, so bands shrink and containment rises by e. Where commands act with a delay,
+//! the cell is that of the prediction ([`crate::delay`]), and e that of the prediction.
 //!
 //! All numbers of the abstraction are in the device's micro-units, so that the edges of the cells are exact.
 
@@ -19,6 +20,7 @@ use firmware::units::AXIS_F;
 use crate::abstraction::Abstraction;
 use crate::abstraction::affine::{AbstractionError, AffineAbstraction, AffineInput, Growth};
 use crate::abstraction::tube::TubeGuard;
+use crate::delay::{Delay, DelayError, known_within};
 use crate::game::bitset::BitSet;
 use crate::game::guard::Guard;
 use crate::game::reach::{may_reach, reach};
@@ -63,14 +65,9 @@ pub struct Synthesis {
 /// Why there are no laws.
 #[derive(Debug, thiserror::Error)]
 pub enum SynthesisError {
-    /// An uncertainty that the games do not cover.
-    #[error(
-        "uncertainty.actuation_delay_s = {delay_s}: the games do not cover a delay yet; allowed: 0 (simulate --delay-s shows its effect)"
-    )]
-    Delay {
-        /// The delay asked for \[s\].
-        delay_s: f64,
-    },
+    /// A delay that the device cannot predict over.
+    #[error(transparent)]
+    Delay(#[from] DelayError),
     /// The spec's grid is not one for the device.
     #[error("the grid does not fit the device: {0:?}")]
     Grid(GridError),
@@ -158,42 +155,55 @@ pub fn period_s(spec: &Spec) -> f64 {
 /// The abstraction of a spec's plant on its grid.
 ///
 /// # Errors
-/// As [`AffineAbstraction::new`].
-pub fn abstraction(
-    spec: &Spec,
-    grid: &Grid,
-) -> Result<AffineAbstraction<STATES>, AbstractionError> {
+/// As [`AffineAbstraction::new`], and a delay that the device cannot predict over.
+pub fn abstraction(spec: &Spec, grid: &Grid) -> Result<AffineAbstraction<STATES>, SynthesisError> {
     let growth = match spec.method.successor {
         Successor::GrowthBound => Growth::GrowthBound,
         Successor::ExactLinear => Growth::ExactLinear,
     };
-    AffineAbstraction::new(
-        grid_shape(grid),
-        &inputs(spec),
-        period_s(spec),
-        growth,
-        measurement_micro(spec),
-    )
+    let (shape, inputs, period_s) = (grid_shape(grid), inputs(spec), period_s(spec));
+    let Some(delay) = Delay::of(spec)? else {
+        let measurement = measurement_micro(spec);
+        return Ok(AffineAbstraction::new(
+            shape,
+            &inputs,
+            period_s,
+            growth,
+            measurement,
+        )?);
+    };
+    let drifts = Some(&delay.drifts[..]);
+    let errors = delay.errors;
+    Ok(AffineAbstraction::with_drifts(
+        shape, &inputs, period_s, growth, errors, drifts,
+    )?)
 }
 
 /// The guard of a band \[µHz\], if the spec asks for the time between the samples and the band has an end.
-fn between_samples(spec: &Spec, grid: &Grid, (low, high): (f64, f64)) -> OptionalGuard {
+fn between_samples(
+    spec: &Spec,
+    grid: &Grid,
+    (low, high): (f64, f64),
+) -> Result<OptionalGuard, DelayError> {
     let bounded = low.is_finite() || high.is_finite();
     if !(spec.method.between_samples && bounded) {
-        return OptionalGuard(None);
+        return Ok(OptionalGuard(None));
     }
-    OptionalGuard(Some(TubeGuard::new(
+    Ok(OptionalGuard(Some(TubeGuard::new(
         &grid_shape(grid),
         &inputs(spec),
         period_s(spec),
-        measurement_micro(spec),
+        known_within(spec)?,
         AXIS_F,
         (low, high),
-    )))
+    ))))
 }
 
 /// The guard of C1 and C2: f stays above containment between the samples too, if the spec asks for it.
-pub fn containment_guard(spec: &Spec, grid: &Grid) -> OptionalGuard {
+///
+/// # Errors
+/// A delay that the device cannot predict over.
+pub fn containment_guard(spec: &Spec, grid: &Grid) -> Result<OptionalGuard, DelayError> {
     let low = spec.requirements.containment_hz.map(containment_micro);
     between_samples(
         spec,
@@ -203,7 +213,10 @@ pub fn containment_guard(spec: &Spec, grid: &Grid) -> OptionalGuard {
 }
 
 /// The guard of Hold: f stays in I2 between the samples too, if the spec asks for it.
-pub fn stay_guard(spec: &Spec, grid: &Grid) -> OptionalGuard {
+///
+/// # Errors
+/// A delay that the device cannot predict over.
+pub fn stay_guard(spec: &Spec, grid: &Grid) -> Result<OptionalGuard, DelayError> {
     let [low, high] = spec.requirements.inner_micro().map(f64::from);
     between_samples(spec, grid, (low, high))
 }
@@ -265,18 +278,14 @@ pub fn synthesise<'w>(
     spec: &Spec,
     watch: &dyn Fn(&'static str) -> Box<dyn Watch + 'w>,
 ) -> Result<Synthesis, SynthesisError> {
-    let delay_s = spec.uncertainty.actuation_delay_s;
-    if delay_s != 0.0 {
-        return Err(SynthesisError::Delay { delay_s });
-    }
     let grid = device_grid(spec).map_err(SynthesisError::Grid)?;
     let before = usage::cpu_s();
     let abstraction = abstraction(spec, &grid)?;
     let requirements = &spec.requirements;
     let containment = requirements.containment_hz.map(containment_micro);
-    let contained = containment_guard(spec, &grid);
+    let contained = containment_guard(spec, &grid)?;
     let abstraction_cpu_s = usage::cpu_s() - before;
-    let error = measurement_micro(spec)[0];
+    let error = known_within(spec)?[AXIS_F];
     let [outer_low, outer_high] = requirements.outer_micro().map(f64::from);
     let [inner_low, inner_high] = requirements.inner_micro().map(f64::from);
     let outer = cells_within(&grid, outer_low, outer_high, error);
@@ -287,7 +296,7 @@ pub fn synthesise<'w>(
         Some(limit) => by_frequency(&grid, |low, _| low - error < limit),
     };
     let hold = if requirements.stay {
-        let stay = stay_guard(spec, &grid);
+        let stay = stay_guard(spec, &grid)?;
         let mut last = 0;
         let law = solve("Hold", watch, |watch| {
             let watch = LastCells::new(watch);

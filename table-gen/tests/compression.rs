@@ -88,7 +88,7 @@ fn the_exact_table_answers_every_winning_cell_and_still_wins() {
     assert!(inputs <= 8192, "{inputs} bytes without membership");
     let view = TableView::parse(&bytes).unwrap();
     let abstraction = synthesis::abstraction(&spec, &synthesis.grid).unwrap();
-    let guard = synthesis::containment_guard(&spec, &synthesis.grid);
+    let guard = synthesis::containment_guard(&spec, &synthesis.grid).unwrap();
     let shape = synthesis::grid_shape(&synthesis.grid);
     for law in &laws.laws {
         let winning = solved(&synthesis, law.law).solution.winning;
@@ -110,8 +110,8 @@ fn the_exact_table_answers_every_winning_cell_and_still_wins() {
             &solution,
             &dense::lowest,
         ));
-        let header = emit::header(&spec, synthesis.grid).unwrap();
-        let dense_bytes = emit::assemble(header, &encoded).unwrap();
+        let head = emit::head(&spec, synthesis.grid).unwrap();
+        let dense_bytes = emit::assemble(head, &encoded).unwrap();
         let dense_view = TableView::parse(&dense_bytes).unwrap();
         for (index, level) in levels.iter().enumerate() {
             let cell = Cell(shape.cell(index).map(|i| i as u16));

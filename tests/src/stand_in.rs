@@ -40,6 +40,7 @@ fn header(stay: bool) -> Result<Header, GridError> {
         stay,
         tick_ms: 100,
         period_ticks: 15,
+        delay_ticks: 0,
         outer: Band {
             low_uhz: -300_000,
             high_uhz: 0,

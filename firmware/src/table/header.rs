@@ -15,19 +15,20 @@
 //! | 73 | 1 | flags: bit 0 `stay` | |
 //! | 74 | 2 | tick | ms |
 //! | 76 | 2 | ticks a period | |
-//! | 78 | 2 | reserved, 0 | |
+//! | 78 | 2 | delay of the commands (0..=64) | ticks |
 //! | 80 | 2 × 4 | I1: low, high | µHz |
 //! | 88 | 2 × 4 | I2: low, high | µHz |
 //! | 96 | 2 × 4 | droop: dead band, full response | µHz |
 //! | 104 | 8 × 4 | plant: 1/R_eq, T_G, T_t, T_1, T_2, D, H, fleet | kW/Hz, ms…, see [`PlantParameters`] |
 //! | 136 | 3 × 12 | directory: C1, C2, Hold | see [`LawEntry`] |
-//! | 172 | | blocks | |
+//! | 172 | | prediction part ([`crate::prediction`]), if the delay is not 0; then blocks | |
 //! | end - 4 | 4 | CRC-32 of all before it | |
 
 use super::bytes::{array_at, byte_at, i32_at, u16_at, u32_at};
 use super::{TableError, checksum};
 use crate::droop::Droop;
 use crate::grid::Grid;
+use crate::prediction::{DELAY_TICKS_MAX, prediction_len};
 use crate::units::{Band, MICRO, Participation, STATES};
 
 /// First bytes of every table: "Holdfast decision table".
@@ -35,7 +36,7 @@ pub const MAGIC: [u8; 4] = *b"HFDT";
 /// Byte-order mark as a little-endian reader must find it.
 pub const BYTE_ORDER_MARK: u16 = 0xFEFF;
 /// The version of the format that this module reads and writes.
-pub const FORMAT_VERSION: u16 = 1;
+pub const FORMAT_VERSION: u16 = 2;
 /// Bytes of the spec hash.
 pub const SPEC_HASH_LEN: usize = 16;
 /// Laws that a table may hold.
@@ -146,6 +147,8 @@ pub struct Header {
     pub tick_ms: u16,
     /// Ticks for which C1, C2 and Hold hold a decision; not zero.
     pub period_ticks: u16,
+    /// Ticks from a command to its power, 0..=[`DELAY_TICKS_MAX`].
+    pub delay_ticks: u16,
     /// I1.
     pub outer: Band,
     /// I2.
@@ -236,7 +239,10 @@ impl Header {
         let (tick_ms, period_ticks) = (u16_at(bytes, 74), u16_at(bytes, 76));
         check(tick_ms > 0, 74)?;
         check(period_ticks > 0, 76)?;
-        check(u16_at(bytes, 78) == 0, 78)?;
+        let delay_ticks = u16_at(bytes, 78);
+        // The prediction part lies between header and blocks.
+        let least = HEADER_LEN + prediction_len(delay_ticks) + CRC_LEN;
+        check(delay_ticks <= DELAY_TICKS_MAX && bytes.len() >= least, 78)?;
         let band = |at| Band {
             low_uhz: i32_at(bytes, at),
             high_uhz: i32_at(bytes, at + 4),
@@ -276,6 +282,7 @@ impl Header {
             stay: flags & 1 == 1,
             tick_ms,
             period_ticks,
+            delay_ticks,
             outer,
             inner,
             droop,

@@ -1,4 +1,4 @@
-//! The flash image: a header, then one block per law, then a CRC.
+//! The flash image: a header, the coefficients of the prediction if commands act with a delay, one block per law, a CRC.
 //!
 //! Reader ([`TableView`]) and writer ([`write`]) of the format live here, so that they cannot drift apart;
 //! `docs/table-format.md` gives the same bytes in prose. All integers are little-endian.
@@ -34,6 +34,7 @@ pub use tree_node::{Children, LEAF_VALUES, NODE_LEN_MAX, Node, SKIP_MAX};
 pub use write::{WriteError, seal, write_header};
 
 use crate::grid::{Cell, GridError};
+use crate::prediction::{PredictionView, prediction_len};
 
 /// CRC-32 as in Ethernet and zip (polynomial 0x04C11DB7 reflected).
 const CRC: crc::Crc<u32> = crc::Crc::<u32>::new(&crc::CRC_32_ISO_HDLC);
@@ -149,7 +150,8 @@ impl<'t> TableView<'t> {
     pub fn parse(bytes: &'t [u8]) -> Result<Self, TableError> {
         let header = Header::parse(bytes)?;
         let mut laws = [None, None, None];
-        let mut at = HEADER_LEN;
+        // The header has been held against the image's length.
+        let mut at = HEADER_LEN + prediction_len(header.delay_ticks);
         for law in Law::ALL {
             let entry = header.laws[law as usize];
             let Some(entry) = entry else { continue };
@@ -202,6 +204,13 @@ impl<'t> TableView<'t> {
     /// The header.
     pub fn header(&self) -> &Header {
         &self.header
+    }
+
+    /// The coefficients of the prediction, if commands act with a delay.
+    pub fn prediction(&self) -> Option<PredictionView<'t>> {
+        let len = prediction_len(self.header.delay_ticks);
+        let part = self.bytes.get(HEADER_LEN..HEADER_LEN + len)?;
+        (!part.is_empty()).then(|| PredictionView::new(part))
     }
 
     /// The whole image.

@@ -34,6 +34,7 @@ pub fn write_header(header: &Header) -> [u8; HEADER_LEN] {
     put(72, &[header.levels, u8::from(header.stay)]);
     put(74, &header.tick_ms.to_le_bytes());
     put(76, &header.period_ticks.to_le_bytes());
+    put(78, &header.delay_ticks.to_le_bytes());
     let bands = [header.outer, header.inner];
     for (index, band) in bands.iter().enumerate() {
         put(80 + 8 * index, &band.low_uhz.to_le_bytes());

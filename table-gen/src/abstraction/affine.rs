@@ -51,6 +51,24 @@ pub struct AffineInput<const D: usize> {
     pub drive: Interval,
 }
 
+/// What an input adds to the state over a step \[plant units\].
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Drift<const D: usize> {
+    /// Enclosure of the centre.
+    pub centre: Vector<D>,
+    /// Largest distance from it on each axis.
+    pub radius: [f64; D],
+}
+
+/// Errors of what the controller knows \[plant units\].
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Errors<const D: usize> {
+    /// Widens the cell before the step.
+    pub before: [f64; D],
+    /// Widens its successor.
+    pub after: [f64; D],
+}
+
 /// Why an abstraction cannot be built.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum AbstractionError {
@@ -131,6 +149,26 @@ impl<const D: usize> AffineAbstraction<D> {
         growth: Growth,
         measurement: [f64; D],
     ) -> Result<Self, AbstractionError> {
+        let errors = Errors {
+            before: measurement,
+            after: measurement,
+        };
+        Self::with_drifts(shape, inputs, period_s, growth, errors, None)
+    }
+
+    /// The same with errors of its own before and after the step, and with what each input adds over the step where that is not
+    /// the response to the input's own drive (commands that act late).
+    ///
+    /// # Errors
+    /// As [`AffineAbstraction::new`].
+    pub fn with_drifts(
+        shape: GridShape<D>,
+        inputs: &[AffineInput<D>],
+        period_s: f64,
+        growth: Growth,
+        errors: Errors<D>,
+        drifts: Option<&[Drift<D>]>,
+    ) -> Result<Self, AbstractionError> {
         if inputs.is_empty() || inputs.len() > 32 {
             return Err(AbstractionError::Inputs {
                 found: inputs.len(),
@@ -146,18 +184,22 @@ impl<const D: usize> AffineAbstraction<D> {
         }
         let mut modes: Vec<Mode<D>> = Vec::new();
         let mut steps = Vec::with_capacity(inputs.len());
-        for input in inputs {
+        for (index, input) in inputs.iter().enumerate() {
             let known = modes
                 .iter()
                 .position(|mode| mode.a == input.a && mode.b == input.b);
             let mode = match known {
                 Some(mode) => mode,
                 None => {
-                    modes.push(Mode::new(&shape, input, period_s, growth, measurement)?);
+                    modes.push(Mode::new(&shape, input, period_s, growth, errors.before)?);
                     modes.len() - 1
                 }
             };
-            let (offset, span) = modes[mode].step(&shape, input.drive, measurement)?;
+            let drift = match drifts.and_then(|drifts| drifts.get(index)) {
+                Some(drift) => *drift,
+                None => modes[mode].drift(input.drive),
+            };
+            let (offset, span) = modes[mode].step(&shape, &drift, errors.after)?;
             steps.push(Step { mode, offset, span });
         }
         let mut extents = Extents {
@@ -269,25 +311,36 @@ impl<const D: usize> Mode<D> {
         Ok(mode)
     }
 
-    /// Offset and span of an input whose drive varies in an interval.
+    /// What a drive that varies in an interval adds over the step.
+    fn drift(&self, drive: Interval) -> Drift<D> {
+        let radius = drive.radius();
+        Drift {
+            centre: self
+                .flow
+                .gamma
+                .map(|gamma| gamma * Interval::point(drive.mid())),
+            radius: self.absolute.map(|absolute| (absolute * radius).next_up()),
+        }
+    }
+
+    /// Offset and span of an input.
     fn step(
         &self,
         shape: &GridShape<D>,
-        drive: Interval,
-        measurement: [f64; D],
+        drift: &Drift<D>,
+        after: [f64; D],
     ) -> Result<([i64; D], [i64; D]), AbstractionError> {
         let (mut offset, mut span) = ([0i64; D], [0i64; D]);
         for d in 0..D {
             // Centre of the box for cell index 0 on every axis, relative to the grid's lower edge.
-            let mut centre = self.flow.gamma[d] * Interval::point(drive.mid());
+            let mut centre = drift.centre[d];
             for j in 0..D {
                 let middle = Interval::point(shape.lower[j])
                     + Interval::point(0.5) * Interval::point(shape.width[j]);
                 centre = centre + self.flow.phi[d][j] * middle;
             }
             centre = centre - Interval::point(shape.lower[d]);
-            let varying = (self.absolute[d] * drive.radius()).next_up();
-            let radius = ((self.radius[d] + varying).next_up() + measurement[d]).next_up();
+            let radius = ((self.radius[d] + drift.radius[d]).next_up() + after[d]).next_up();
             let width = Interval::point(shape.width[d]);
             let spread = Interval {
                 low: -radius,

@@ -3,6 +3,7 @@
 pub mod microcontrollers;
 pub mod sweep;
 
+use firmware::prediction::prediction_len;
 use firmware::table::{CRC_LEN, HEADER_LEN, Law, TableView};
 use serde::Serialize;
 
@@ -80,7 +81,7 @@ pub fn budget(table: &TableView<'_>) -> Budget {
         .collect();
     Budget {
         table_bytes: bytes,
-        header_bytes: HEADER_LEN + CRC_LEN,
+        header_bytes: HEADER_LEN + prediction_len(table.header().delay_ticks) + CRC_LEN,
         laws,
         rooms,
     }

@@ -145,6 +145,7 @@ struct SimulateReport<'r> {
     #[serde(skip_serializing_if = "Option::is_none")]
     scenario: Option<&'r str>,
     loss_gw: f64,
+    delay_s: f64,
     duration_s: f64,
     #[serde(flatten)]
     summary: &'r Summary,
@@ -205,6 +206,7 @@ pub(super) fn run(args: &SimulateArgs) -> Result<(), Failure> {
         controller,
         scenario: file.as_ref().map(|file| file.name.as_str()),
         loss_gw: disturbances.losses.iter().map(|loss| loss.power_gw).sum(),
+        delay_s: scenario.delay_s,
         duration_s: scenario.duration_s,
         summary: &run.summary,
         phases: &run.phases,

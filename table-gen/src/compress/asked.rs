@@ -34,7 +34,7 @@ impl Context<'_, '_> {
             let Some(solved) = solved else { continue };
             let domain = solved.solution.winning_set(law == Law::Hold);
             let target = (law != Law::Hold).then(|| target(&solved.solution.ranks));
-            let guard = self.guard(law);
+            let guard = self.guard(law)?;
             let watch = self.watch(law);
             let candidates = deadbeat::candidates(self.spec, shape, self.band(law));
             let task = InputsTask {
@@ -57,7 +57,7 @@ impl Context<'_, '_> {
         for (controller, ..) in &controllers {
             dense[controller.law as usize] = Some(controller.dense(self.abstraction));
         }
-        let image = emit::assemble(emit::header(self.spec, *self.grid)?, &dense)?;
+        let image = emit::assemble(emit::head(self.spec, *self.grid)?, &dense)?;
         drop(dense);
         let table = TableView::parse(&image).map_err(EmitError::Rejected)?;
         let mut asked = reachable::reachable(self.spec, self.abstraction, &table)?;
@@ -67,7 +67,7 @@ impl Context<'_, '_> {
             if !asked.closed {
                 break;
             }
-            let image = emit::assemble(emit::header(self.spec, *self.grid)?, &best.encoded())?;
+            let image = emit::assemble(emit::head(self.spec, *self.grid)?, &best.encoded())?;
             let table = TableView::parse(&image).map_err(EmitError::Rejected)?;
             asked = reachable::reachable(self.spec, self.abstraction, &table)?;
             let next = self.narrow(&controllers, &asked)?;

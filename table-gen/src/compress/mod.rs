@@ -37,13 +37,14 @@ mod winning;
 use firmware::grid::Grid;
 use firmware::table::{InputsKind, LAWS, Law, LawEntry, TableView};
 
-use crate::abstraction::affine::{AbstractionError, AffineAbstraction};
+use crate::abstraction::affine::AffineAbstraction;
+use crate::delay::DelayError;
 use crate::emit::{self, EmitError, EncodedLaw};
 use crate::game::bitset::BitSet;
 use crate::game::{GameError, NOT_WON, Watch};
 use crate::plant::STATES;
 use crate::spec::{self, Spec};
-use crate::synthesis::{self, OptionalGuard, SolvedLaw, Synthesis};
+use crate::synthesis::{self, OptionalGuard, SolvedLaw, Synthesis, SynthesisError};
 use inputs::CompressedInputs;
 use membership::DomainPart;
 
@@ -133,7 +134,10 @@ impl CompressedLaws {
 pub enum CompressError {
     /// The abstraction cannot be built.
     #[error(transparent)]
-    Abstraction(#[from] AbstractionError),
+    Synthesis(#[from] SynthesisError),
+    /// A delay that the device cannot predict over.
+    #[error(transparent)]
+    Delay(#[from] DelayError),
     /// A game inside compression has no result.
     #[error("while ranking the compressed law: {0}")]
     Game(#[from] GameError),
@@ -205,8 +209,8 @@ pub fn table<'w>(
     watch: &dyn Fn(&'static str) -> Box<dyn Watch + 'w>,
 ) -> Result<(Vec<u8>, CompressedLaws), CompressError> {
     let laws = compress(spec, synthesis, options, watch)?;
-    let header = emit::header(spec, synthesis.grid)?;
-    let image = emit::assemble(header, &laws.encoded())?;
+    let head = emit::head(spec, synthesis.grid)?;
+    let image = emit::assemble(head, &laws.encoded())?;
     Ok((image, laws))
 }
 
@@ -221,7 +225,7 @@ struct Context<'c, 'w> {
 impl<'w> Context<'_, 'w> {
     /// Whether the closed loop from the spec's initial states finds an entry wherever it comes.
     fn covers_the_event(&self, laws: &CompressedLaws) -> Result<bool, CompressError> {
-        let image = emit::assemble(emit::header(self.spec, *self.grid)?, &laws.encoded())?;
+        let image = emit::assemble(emit::head(self.spec, *self.grid)?, &laws.encoded())?;
         let table = TableView::parse(&image).map_err(EmitError::Rejected)?;
         match reachable::reachable(self.spec, self.abstraction, &table) {
             Ok(_) => Ok(true),
@@ -230,7 +234,7 @@ impl<'w> Context<'_, 'w> {
         }
     }
 
-    fn guard(&self, law: Law) -> OptionalGuard {
+    fn guard(&self, law: Law) -> Result<OptionalGuard, DelayError> {
         match law {
             Law::Hold => synthesis::stay_guard(self.spec, self.grid),
             Law::C1 | Law::C2 => synthesis::containment_guard(self.spec, self.grid),

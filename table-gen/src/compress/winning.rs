@@ -92,7 +92,7 @@ impl Context<'_, '_> {
     ) -> Result<Option<CompressedLaws>, CompressError> {
         let outer = target(&synthesis.c1.solution.ranks);
         let inner = target(&c2.solution.ranks);
-        let guard = self.guard(Law::C2);
+        let guard = self.guard(Law::C2)?;
         let watch = self.watch(Law::C2);
         let all = u32::MAX >> (u32::BITS - self.abstraction.inputs() as u32);
         let mut asked = c2.solution.winning_set(false);
@@ -146,7 +146,7 @@ impl Context<'_, '_> {
         mut asked: BitSet,
         solution: &Solution,
     ) -> Result<CompressedLaws, CompressError> {
-        let guard = self.guard(Law::C2);
+        let guard = self.guard(Law::C2)?;
         let watch = self.watch(Law::C2);
         let mut everywhere = asked.clone();
         everywhere.add(&c1.cells);
@@ -211,7 +211,7 @@ impl Context<'_, '_> {
         covered: &BitSet,
         within: bool,
     ) -> Result<Made, CompressError> {
-        let guard = self.guard(law);
+        let guard = self.guard(law)?;
         let watch = self.watch(law);
         let target = (law != Law::Hold).then(|| {
             let mut target = target(&solved.solution.ranks);

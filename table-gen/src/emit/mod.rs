@@ -1,4 +1,4 @@
-//! From laws to flash bytes: the header out of the spec, one block per law, the seal.
+//! From laws to flash bytes: header and prediction out of the spec, one block per law, the seal.
 
 pub mod dense;
 
@@ -9,6 +9,7 @@ use firmware::table::{
 };
 use firmware::units::Band;
 
+use crate::delay::{self, Delay, DelayError};
 use crate::spec::Spec;
 
 /// One law, encoded.
@@ -20,6 +21,15 @@ pub struct EncodedLaw {
     pub domain: Vec<u8>,
     /// The inputs part.
     pub inputs: Vec<u8>,
+}
+
+/// What comes before the laws.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Head {
+    /// The header, its directory still empty.
+    pub header: Header,
+    /// The prediction part; empty without a delay.
+    pub prediction: Vec<u8>,
 }
 
 /// Why a table cannot be emitted.
@@ -35,6 +45,9 @@ pub enum EmitError {
         /// What fits.
         allowed: &'static str,
     },
+    /// A delay that the device cannot predict over.
+    #[error(transparent)]
+    Delay(#[from] DelayError),
     /// The image is too long.
     #[error("the table does not fit its length field: {0:?}")]
     Write(WriteError),
@@ -43,11 +56,19 @@ pub enum EmitError {
     Rejected(TableError),
 }
 
-/// The header of a spec's table, its directory still empty.
+/// The head of a spec's table.
 ///
 /// # Errors
 /// A number that does not fit its field.
-pub fn header(spec: &Spec, grid: Grid) -> Result<Header, EmitError> {
+pub fn head(spec: &Spec, grid: Grid) -> Result<Head, EmitError> {
+    let delay = Delay::of(spec)?;
+    Ok(Head {
+        header: header(spec, grid)?,
+        prediction: delay.map_or_else(Vec::new, |delay| delay.coefficients.bytes()),
+    })
+}
+
+fn header(spec: &Spec, grid: Grid) -> Result<Header, EmitError> {
     let band = |[low_uhz, high_uhz]: [i32; 2]| Band { low_uhz, high_uhz };
     let ms = "1 to 65535 ms";
     let ticks = spec.sampling.ticks_per_period();
@@ -63,6 +84,8 @@ pub fn header(spec: &Spec, grid: Grid) -> Result<Header, EmitError> {
         stay: spec.requirements.stay,
         tick_ms: narrow("sampling.watch_s", spec.sampling.watch_ms(), ms)?,
         period_ticks: narrow("sampling.period_s", ticks, "1 to 65535 ticks of watch_s")?,
+        // The spec allows 64 ticks at most.
+        delay_ticks: delay::ticks(spec) as u16,
         outer: band(spec.requirements.outer_micro()),
         inner: band(spec.requirements.inner_micro()),
         droop: Droop {
@@ -117,18 +140,22 @@ fn narrow(key: &'static str, value: u32, allowed: &'static str) -> Result<u16, E
     }
 }
 
-/// The whole image: header, blocks, CRC. The firmware's reader must accept it.
+/// The whole image: head, blocks, CRC. The firmware's reader must accept it.
 ///
 /// # Errors
 /// An image that is too long, or that the reader refuses.
 pub fn assemble(
-    mut header: Header,
+    Head {
+        mut header,
+        prediction,
+    }: Head,
     laws: &[Option<EncodedLaw>; LAWS],
 ) -> Result<Vec<u8>, EmitError> {
     for (entry, law) in header.laws.iter_mut().zip(laws) {
         *entry = law.as_ref().map(|law| law.entry);
     }
     let mut image = table::write_header(&header).to_vec();
+    image.extend_from_slice(&prediction);
     for law in laws.iter().flatten() {
         image.extend_from_slice(&law.domain);
         image.extend_from_slice(&law.inputs);

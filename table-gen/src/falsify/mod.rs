@@ -48,7 +48,7 @@ pub fn falsify(
     seed: u64,
 ) -> Result<Falsification, VerifyError> {
     let table = TableView::parse(bytes).map_err(VerifyError::Table)?;
-    let model = Model::new(table.header(), spec);
+    let model = Model::new(&table, spec);
     let settle = (spec.requirements.settle_within_s / model.tick_s).floor() as u32;
     let inner = spec.requirements.inner_hz.map(|hz| micro(hz).mid());
     let search = Search {

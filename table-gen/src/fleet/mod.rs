@@ -3,13 +3,16 @@
 //!
 //! A tick of the table is cut into ten parts. Each charger ticks in one of them, by its clock's offset, and sees the
 //! frequency of that moment; the power of the fleet is constant over a part, and the plant takes an exact step. Responses
-//! are summed as whole ppm, so that the result does not depend on the number of threads.
+//! are summed as whole ppm, so that the result does not depend on the number of threads. Power follows responses by the scenario's delay, to the
+//! nearest part of a tick.
 //!
 //! The power of the fleet is the spec's whatever the number of instances: each stands for `chargers / instances` of them.
 
 mod hardware;
 mod instance;
 pub mod measure;
+
+use std::collections::VecDeque;
 
 use firmware::control_loop::ControlLoop;
 use firmware::table::TableView;
@@ -132,6 +135,8 @@ pub fn run(
     let ticks = (scenario.duration_s / tick_s).ceil().max(1.0) as u32;
     let mut told = ControlLoop::with_table(Ok(table.clone()));
     let mut given_of_slot = [0i64; PARTS];
+    let late = (scenario.delay_s / part_s).round() as usize;
+    let mut under_way: VecDeque<f64> = std::iter::repeat_n(0.0, late).collect();
     let mut x = scenario.initial;
     let mut monitor = Monitor::new(spec);
     let mut meters = Meters::new(tick_s, config.instances, plant.fleet);
@@ -149,7 +154,8 @@ pub fn run(
             let one = all(slot, now_ms, measured(&x).frequency_uhz());
             given_of_slot[part] = one.given_ppm;
             tally = tally + one;
-            let given = given_of_slot.iter().sum::<i64>() as f64 / total;
+            under_way.push_back(given_of_slot.iter().sum::<i64>() as f64 / total);
+            let given = under_way.pop_front().unwrap_or(0.0);
             let net = plant.fleet * given - scenario.loss_gw;
             let from_s = time_s + part as f64 * part_s;
             let knot = |time_s: f64, x: &[f64; 4]| Knot {

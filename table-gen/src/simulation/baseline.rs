@@ -6,7 +6,10 @@
 //!
 //! Five states, with kinks at the dead band and at saturation, by the classical Runge-Kutta method. At 1 ms the local
 //! error away from the kinks is about (h / T_ev)⁵ / 120 = 2e-10, and at a kink h² times the change of slope, 1e-6 times
-//! a slope in q of at most 1/s: below the printed digits.
+//! a slope in q of at most 1/s: below the printed digits. With a delay the power follows u by a whole number of steps, held over each: it
+//! is late by half a step more or less.
+
+use std::collections::VecDeque;
 
 use super::beyond::Disturbances;
 use super::beyond::plant::{BeyondPlant, runge_kutta};
@@ -43,15 +46,20 @@ pub fn simulate_under(
     let h = scenario.duration_s / steps as f64;
     let [f, g, l, p] = scenario.initial;
     let mut y = [f, g, l, p, 0.0];
+    let late = (scenario.delay_s / h).round() as usize;
+    let mut under_way: VecDeque<f64> = std::iter::repeat_n(0.0, late).collect();
     let mut monitor = Monitor::new(spec);
     let mut samples = Vec::with_capacity(steps / STEPS_PER_SAMPLE + 2);
     for step in 0..=steps {
         let time_s = h * step as f64;
         let drive = plant.drive(time_s + 0.5 * h);
+        under_way.push_back(participation(y[STATES]));
+        let acting = under_way.pop_front().unwrap_or(0.0);
+        let delivered = |q: f64| if late == 0 { participation(q) } else { acting };
         let derivative = |y: &[f64; STATES + 1]| {
             let x = [y[0], y[1], y[2], y[3]];
             let q = y[STATES];
-            let power = grid.fleet * participation(q);
+            let power = grid.fleet * delivered(q);
             let [df, dg, dl, dp] = plant.derivative(&x, &drive, power);
             let e = (-x[0] - baseline.deadband_hz).max(0.0) / baseline.droop_hz;
             [df, dg, dl, dp, (e - grid.damping * q) / lag]
@@ -69,7 +77,7 @@ pub fn simulate_under(
                 time_s,
                 state: [y[0], y[1], y[2], y[3]],
                 participation: u,
-                delivered: u,
+                delivered: delivered(y[STATES]),
             });
         }
         if step < steps {

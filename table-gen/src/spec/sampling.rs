@@ -71,6 +71,12 @@ impl SamplingSpec {
         self.period_ms() / self.watch_ms().max(1)
     }
 
+    /// Watch ticks in a time \[s\], to the nearest millisecond and down.
+    #[must_use]
+    pub fn ticks_of(&self, time_s: f64) -> u32 {
+        to_ms(time_s) / self.watch_ms().max(1)
+    }
+
     /// The period in milliseconds.
     #[must_use]
     pub fn period_ms(&self) -> u32 {

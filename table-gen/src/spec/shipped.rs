@@ -5,6 +5,7 @@ pub(super) const SHIPPED: &[(&str, &str)] = &[
     ("paper-bi", include_str!("../../specs/paper-bi.toml")),
     ("paper-uni", include_str!("../../specs/paper-uni.toml")),
     ("gb-bi", include_str!("../../specs/gb-bi.toml")),
+    ("gb-bi-delay", include_str!("../../specs/gb-bi-delay.toml")),
     ("gb-uni", include_str!("../../specs/gb-uni.toml")),
     (
         "gb-bi-normal",

@@ -1,5 +1,7 @@
 //! Values: each key against its range, then keys against each other.
 
+use firmware::prediction::DELAY_TICKS_MAX;
+
 use super::allowed::{self, Allowed};
 use super::keys::{KEYS, Key, KeyValue};
 use super::overrides::Origin;
@@ -34,6 +36,7 @@ impl Spec {
         check_input(&self.input, origin)?;
         check_sampling(&self.sampling, origin)?;
         check_uncertainty(&self.uncertainty, origin)?;
+        check_delay(&self.uncertainty, &self.sampling, origin)?;
         check_requirements(&self.requirements, origin)?;
         geometry::check_grid(&self.grid, origin)?;
         geometry::check_initial(self, origin)?;
@@ -152,6 +155,37 @@ fn check_uncertainty(uncertainty: &UncertaintySpec, origin: &Origin) -> Result<(
         });
     }
     Ok(())
+}
+
+/// The device remembers the commands of so many ticks.
+fn check_delay(
+    uncertainty: &UncertaintySpec,
+    sampling: &SamplingSpec,
+    origin: &Origin,
+) -> Result<(), SpecError> {
+    let delay_s = uncertainty.actuation_delay_s;
+    let watch_ms = sampling.watch_ms().max(1);
+    let whole = to_whole_ms(delay_s).is_some_and(|delay_ms| delay_ms % watch_ms == 0);
+    let ticks = sampling.ticks_of(delay_s);
+    let most = u32::from(DELAY_TICKS_MAX);
+    if whole && ticks <= most {
+        return Ok(());
+    }
+    let found = format!(
+        "{delay_s} s, beside sampling.watch_s = {} s",
+        sampling.watch_s
+    );
+    let nearest_ms = ticks.min(most) * watch_ms;
+    let allowed = format!(
+        "a whole number of watch ticks, at most {most}, such as {} s",
+        f64::from(nearest_ms) / 1e3
+    );
+    Err(inconsistent(
+        origin,
+        "uncertainty.actuation_delay_s",
+        found,
+        allowed,
+    ))
 }
 
 fn check_requirements(requirements: &RequirementsSpec, origin: &Origin) -> Result<(), SpecError> {

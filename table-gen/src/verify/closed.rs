@@ -1,7 +1,9 @@
 //! For ever: a closed set of whole cells.
 //!
 //! Under C1, C2 and Hold a decision depends on the cell alone, so the cells that can be reached at decisions form a
-//! graph: from each cell, under the table's own entry, the estimate comes to lie in some box of cells a period later.
+//! graph: from each cell, under the table's own entry, the estimate comes to lie in some box of cells a period later. Where
+//! commands act with a delay the cells are those of the prediction, and the bounds of f are those of the period in which the command acts
+//! ([`super::knowledge`]).
 //! The graph is explored from the cells in which No control can end. Being closed, it speaks for all times:
 //!
 //! - every cell has an entry, no box leaves the grid;
@@ -44,7 +46,10 @@ struct Batch {
 pub(super) struct Closed<'a> {
     pub(super) table: &'a TableView<'a>,
     pub(super) model: &'a Model,
-    pub(super) regions: &'a Regions,
+    /// Cells and the real states in which a command that is decided there begins to act.
+    pub(super) real: &'a Regions,
+    /// Cells and the states from which the way to the next decision is computed.
+    pub(super) from: &'a Regions,
     /// I2 \[µHz\]: what Hold must keep to.
     pub(super) inner: Interval,
 }
@@ -154,9 +159,14 @@ impl Closed<'_> {
             let what = "a lookup visits more than the header states".to_owned();
             batch.violations.push((Violation::Visits, index, what));
         }
-        for (state, f) in self.regions.within(&bounds) {
-            let mut real = self.real(&bounds);
+        // Both cut at the same bands.
+        let parts = self.real.within(&bounds).into_iter();
+        for ((state, f), (_, from_f)) in parts.zip(self.from.within(&bounds)) {
+            let knowledge = &self.model.knowledge;
+            let mut real = widened(&bounds, &knowledge.real);
+            let mut from = widened(&bounds, &knowledge.before);
             real[firmware::units::AXIS_F] = f;
+            from[firmware::units::AXIS_F] = from_f;
             // The level and the run of the decision before do not matter to a decision that finds a law.
             let before = PhaseState {
                 phase: Phase::C1,
@@ -164,11 +174,14 @@ impl Closed<'_> {
                 ticks_left: 0,
             };
             let (next, step) = before.step(self.table, state);
-            let drive = match step {
-                Step::Level(level) => self.model.drives.get(usize::from(level)).copied(),
+            let held = match step {
+                Step::Level(level) => {
+                    let drive = self.model.drives.get(usize::from(level)).copied();
+                    drive.zip(knowledge.drifts.get(usize::from(level)))
+                }
                 Step::Outside => None,
             };
-            let Some(drive) = drive.filter(|_| next.phase != Phase::Fixed) else {
+            let Some((drive, drift)) = held.filter(|_| next.phase != Phase::Fixed) else {
                 let what = "no law has an entry for a reachable cell".to_owned();
                 batch.violations.push((Violation::Uncovered, index, what));
                 continue;
@@ -178,7 +191,7 @@ impl Closed<'_> {
                 batch.violations.push((Violation::Handover, index, what));
             }
             self.bound(index, &real, next.phase, drive, batch);
-            match successor(grid, self.model, &real, drive) {
+            match successor(grid, self.model, &from, drift) {
                 Some(cells) => {
                     visited.insert_box(&cells, &mut batch.new);
                     batch.edges.push(Edge {
@@ -225,21 +238,6 @@ impl Closed<'_> {
                 batch.violations.push((Violation::Left, index, what));
             }
         }
-    }
-
-    /// Real states whose estimate lies in a cell.
-    fn real(&self, bounds: &[(i32, i32); STATES]) -> [Interval; STATES] {
-        std::array::from_fn(|d| {
-            let error = self.model.error[d];
-            let (low, high) = (f64::from(bounds[d].0), f64::from(bounds[d].1));
-            if error == 0.0 {
-                return Interval { low, high };
-            }
-            Interval {
-                low: (low - error).next_down(),
-                high: (high + error).next_up(),
-            }
-        })
     }
 
     /// The path of sets to a cell: backwards through the layers, then the seed's own.
@@ -290,16 +288,30 @@ impl Closed<'_> {
             level: 0,
             ticks_left: 0,
         };
-        let (state, _) = *self.regions.within(&bounds).first()?;
+        let (state, _) = *self.real.within(&bounds).first()?;
         let (next, _) = before.step(self.table, state);
         Some(PathStep {
             tick,
             phase: next.phase,
             level: next.level,
             cell: Some(cell.0),
-            set: self.real(&bounds)[firmware::units::AXIS_F],
+            set: widened(&bounds, &self.model.knowledge.real)[firmware::units::AXIS_F],
         })
     }
+}
+
+/// A cell widened by an error.
+fn widened(bounds: &[(i32, i32); STATES], error: &[f64; STATES]) -> [Interval; STATES] {
+    std::array::from_fn(|d| {
+        let (low, high) = (f64::from(bounds[d].0), f64::from(bounds[d].1));
+        if error[d] == 0.0 {
+            return Interval { low, high };
+        }
+        Interval {
+            low: (low - error[d]).next_down(),
+            high: (high + error[d]).next_up(),
+        }
+    })
 }
 
 fn absorb(tally: &mut Tally, batch: &Batch) {

@@ -60,6 +60,13 @@ pub(super) fn differences(header: &Header, spec: &Spec) -> Vec<String> {
         header.period_ticks.to_string(),
         ticks.to_string(),
     );
+    same(
+        "the delay [ticks]",
+        header.delay_ticks.to_string(),
+        spec.sampling
+            .ticks_of(spec.uncertainty.actuation_delay_s)
+            .to_string(),
+    );
     let band = |band: &firmware::units::Band| format!("{:?}", [band.low_uhz, band.high_uhz]);
     let requirements = &spec.requirements;
     same(

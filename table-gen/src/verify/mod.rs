@@ -9,6 +9,7 @@
 //! |---|---|
 //! | plant, clocks and uncertainty of the closed loop | `model` |
 //! | a stretch of time with a held input, and the frequency within it | `segment` |
+//! | what the state that is decided on says of the real one, with a delay too | `knowledge` |
 //! | tight sets of states | `zonotope` |
 //! | the states on which the phase machine decides alike | `regions` |
 //! | the event at an unknown moment of a tick | `event` |
@@ -23,7 +24,9 @@
 //! two ticks. From then on loss, delivered participation and the estimate's error vary within their bounds as an
 //! adversary likes, the loss and the participation continuously in time.
 //!
-//! Whether I1 and I2 were left or reached is what the firmware measures at its ticks.
+//! Whether I1 and I2 were left or reached is what the firmware measures at its ticks. Where commands act with a delay, it is what the
+//! firmware predicts there for the moment at which its command begins to act, and times end at that moment; bounds of f are always those of
+//! the real f.
 
 pub(crate) mod adversaries;
 mod cellset;
@@ -31,6 +34,7 @@ mod claims;
 mod closed;
 mod event;
 mod header;
+mod knowledge;
 mod longest_path;
 pub(crate) mod model;
 mod path;
@@ -95,33 +99,46 @@ pub fn verify(
     go_on: &dyn Fn(f64) -> bool,
 ) -> Result<Verdict, VerifyError> {
     let table = TableView::parse(bytes).map_err(VerifyError::Table)?;
-    if spec.uncertainty.actuation_delay_s != 0.0 {
-        return Err(VerifyError::Unsupported {
-            key: "uncertainty.actuation_delay_s",
-            found: spec.uncertainty.actuation_delay_s.to_string(),
-            remedy: "set it to 0",
-        });
-    }
     let header = table.header();
-    let model = Model::new(header, spec);
+    let model = Model::new(&table, spec);
     let regions = Regions::new(header, model.error);
+    let [first, real, from] = [
+        model.knowledge.first,
+        model.knowledge.real,
+        model.knowledge.before,
+    ]
+    .map(|error| Regions::new(header, error));
     let settle_ticks = (spec.requirements.settle_within_s / model.tick_s).floor() as u32;
     let [low, high] = spec.requirements.inner_hz;
     let inner = model::micro(low).join(model::micro(high));
     let mut counts = Counts::default();
-    let (tally, reachable_cells, method, scope) = if header.stay {
+    let (tally, reachable_cells, method, scope) = if let Some(limit) = &model.knowledge.limit {
+        let tally = Tally {
+            limit: Some(limit.clone()),
+            ..Tally::default()
+        };
+        (tally, 0, "not explored", String::new())
+    } else if header.stay {
         let job = closed::Closed {
             table: &table,
             model: &model,
-            regions: &regions,
+            real: &real,
+            from: &from,
             inner,
         };
-        let (tally, cells) = for_ever(&job, &mut counts, go_on).ok_or(VerifyError::Interrupted)?;
+        let watching = watching::Watching {
+            table: &table,
+            model: &model,
+            regions: &regions,
+            first: &first,
+        };
+        let (tally, cells) =
+            for_ever(&job, &watching, &mut counts, go_on).ok_or(VerifyError::Interrupted)?;
         (tally, cells, "closed set of cells", String::new())
     } else {
         let horizon_s = spec.requirements.horizon_s;
         let ticks = (horizon_s.unwrap_or(OPEN_HORIZON_S) / model.tick_s).ceil() as u32;
-        let explored = timed::Timed::new(&table, &model, &regions, settle_ticks)
+        let explored = timed::Timed::new(&table, &model, [&regions, &real], settle_ticks)
             .run(ticks, go_on)
             .ok_or(VerifyError::Interrupted)?;
         let mut tally = explored.tally;
@@ -173,15 +190,11 @@ pub fn verify(
 /// No control by tight sets, then the closed set of cells.
 fn for_ever(
     job: &closed::Closed<'_>,
+    watching: &watching::Watching<'_>,
     counts: &mut Counts,
     go_on: &dyn Fn(f64) -> bool,
 ) -> Option<(Tally, u64)> {
     let mut tally = Tally::default();
-    let watching = watching::Watching {
-        table: job.table,
-        model: job.model,
-        regions: job.regions,
-    };
     let watched = watching.watch(&mut tally);
     counts.sets = watched.traces.len() as u64;
     counts.first_cells = watched.seeds.len() as u64;
@@ -191,8 +204,9 @@ fn for_ever(
         None => Vec::new(),
     };
     let cells = job.run(seeds, &seed_path, &mut tally, go_on)?;
-    // From the last tick inside I1 to the first decision, then the periods.
-    tally.settle_ticks = 1 + tally.periods * job.model.period_ticks;
+    // From the last tick inside I1 to the first decision, then the periods, then until Hold's first command acts.
+    let settle = 1 + tally.periods * job.model.period_ticks + job.model.delay_ticks();
+    tally.settle_ticks = settle;
     if let Some(last) = watched.last_tick
         && tally.limit.is_none()
         && !tally.violations.contains_key(&Violation::Late)

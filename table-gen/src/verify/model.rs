@@ -3,8 +3,9 @@
 //! All states and powers are in the device's micro-units (µHz, kW). The plant is linear, so A and b do not change with
 //! the unit. What the firmware does is taken from the header; what the grid and the fleet do from the spec.
 
-use firmware::table::Header;
+use firmware::table::TableView;
 
+use super::knowledge::Knowledge;
 use super::segment::Segment;
 use crate::flow::{Matrix, Vector};
 use crate::interval::Interval;
@@ -24,11 +25,20 @@ pub(crate) struct Drive {
 }
 
 impl Drive {
-    fn of(range: Interval) -> Self {
+    pub(crate) fn of(range: Interval) -> Self {
         let mid = range.mid();
         let exact = range.low == range.high;
         let radius = if exact { 0.0 } else { range.radius() };
         Self { mid, radius }
+    }
+
+    /// The interval.
+    pub(crate) fn range(self) -> Interval {
+        if self.radius == 0.0 {
+            return Interval::point(self.mid);
+        }
+        let radius = Interval::point(self.radius).symmetric();
+        Interval::point(self.mid) + radius
     }
 }
 
@@ -55,26 +65,33 @@ pub(crate) struct Model {
     pub(crate) period: Segment,
     /// Ticks of a period.
     pub(crate) period_ticks: u32,
+    /// What the device knows when it decides.
+    pub(crate) knowledge: Knowledge,
 }
 
 impl Model {
-    /// The closed loop of a table's header with a spec's plant and uncertainty.
-    pub(crate) fn new(header: &Header, spec: &Spec) -> Self {
+    /// The closed loop of a table with a spec's plant and uncertainty.
+    pub(crate) fn new(table: &TableView<'_>, spec: &Spec) -> Self {
+        let header = table.header();
         let (a, b) = GridPlant::new(spec).matrices();
-        let levels = 0..header.levels;
-        let drives = levels
-            .map(|level| Drive::of(net_power(spec, header.participation(level).ppm())))
+        let commands = (0..header.levels).map(|level| header.participation(level).ppm());
+        let drives: Vec<Drive> = commands
+            .clone()
+            .map(|ppm| Drive::of(net_power(spec, ppm)))
             .collect();
         let tick_s = f64::from(header.tick_ms) / 1000.0;
         let period_ticks = u32::from(header.period_ticks);
         // Milliseconds first: the period is then one correctly rounded quotient.
         let period_s = f64::from(u32::from(header.tick_ms) * period_ticks) / 1000.0;
         let initial = &spec.uncertainty.initial;
-        Self {
+        let error = spec.uncertainty.measurement.map(up_micro);
+        let period = Segment::new(&a, &b, period_s);
+        let mut model = Self {
             a,
             b,
+            knowledge: Knowledge::of_estimate(error, &period, &drives),
             drives,
-            error: spec.uncertainty.measurement.map(up_micro),
+            error,
             initial: std::array::from_fn(|d| {
                 let (low, high) = (micro(initial.lower[d]), micro(initial.upper[d]));
                 low.join(high)
@@ -82,9 +99,27 @@ impl Model {
             containment: spec.requirements.containment_hz.map(limit_micro),
             tick_s,
             tick: Segment::new(&a, &b, tick_s),
-            period: Segment::new(&a, &b, period_s),
+            period,
             period_ticks,
+        };
+        // What the grid does is the spec's, whatever the table predicts.
+        let late = spec.sampling.ticks_of(spec.uncertainty.actuation_delay_s);
+        if late > 0 {
+            let expected: Vec<Interval> = commands.map(|ppm| expected_power(spec, ppm)).collect();
+            model.knowledge = Knowledge::of_prediction(table, &model, &expected, late);
         }
+        if u32::from(header.delay_ticks) != late {
+            model.knowledge.limit = Some(format!(
+                "the table predicts over {} ticks, the spec's commands act {late} late",
+                header.delay_ticks
+            ));
+        }
+        model
+    }
+
+    /// Ticks from a command to its power.
+    pub(crate) fn delay_ticks(&self) -> u32 {
+        self.knowledge.delay.as_ref().map_or(0, |delay| delay.ticks)
     }
 
     /// The segment over which a decision is held.
@@ -121,6 +156,14 @@ fn up_micro(value: f64) -> f64 {
 /// A lower limit of frequency \[µHz\], rounded up.
 fn limit_micro(hz: f64) -> f64 {
     micro(hz).high
+}
+
+/// `P u - w` \[kW\] as a device expects it under a command \[ppm\]: all of it is delivered, the loss is in the middle of its band.
+fn expected_power(spec: &Spec, ppm: u32) -> Interval {
+    let [low, high] = spec.uncertainty.loss_gw;
+    let fleet = micro(spec.fleet_power_gw());
+    let loss = (micro(low) + micro(high)) * Interval::point(0.5);
+    fleet * Interval::point(f64::from(ppm)) / Interval::point(MICRO) - loss
 }
 
 /// `P u' - w` \[kW\] for a commanded participation \[ppm\]: u' within the participation error, at most the whole fleet,

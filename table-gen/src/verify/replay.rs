@@ -3,7 +3,10 @@
 //! Plain numbers, no intervals: a trajectory that breaks a claim here by more than the arithmetic's error is a real
 //! counterexample, whatever the sets say.
 
+use std::collections::VecDeque;
+
 use firmware::phase::{Phase, PhaseState, Step};
+use firmware::prediction::History;
 use firmware::table::TableView;
 use firmware::units::{AXIS_F, State};
 
@@ -37,6 +40,8 @@ pub(crate) struct Sample {
     pub(crate) x: [f64; STATES],
     pub(crate) phase: Phase,
     pub(crate) level: u8,
+    /// The phase whose command acts; behind `phase` by the delay.
+    pub(crate) acting: Phase,
 }
 
 /// How a trajectory broke a claim.
@@ -88,7 +93,7 @@ impl<'a> Replay<'a> {
             .model
             .containment
             .map_or(f64::INFINITY, |limit| f - limit);
-        if sample.phase != Phase::Hold {
+        if sample.acting != Phase::Hold {
             return contained;
         }
         contained.min(f - self.inner[0]).min(self.inner[1] - f)
@@ -113,8 +118,12 @@ impl<'a> Replay<'a> {
             x,
             phase: state.phase,
             level: 0,
+            acting: state.phase,
         };
         see(&start);
+        let mut history = History::NONE;
+        let mut under_way: VecDeque<PhaseState> =
+            (0..self.model.delay_ticks()).map(|_| state).collect();
         let (share, _) = adversary.tick(&x, state);
         let first = plain(&Flow::over(&self.model.a, &self.model.b, offset_s));
         x = fly(&first, &x, self.power(0, share));
@@ -124,13 +133,24 @@ impl<'a> Replay<'a> {
             let (share, error) = adversary.tick(&x, state);
             let measured =
                 std::array::from_fn(|d| (x[d] + error[d] * self.model.error[d]).floor() as i32);
-            let (next, step) = state.step(self.table, State(measured));
+            let measured = State(measured);
+            let ahead = || match self.table.prediction() {
+                Some(prediction) => prediction.predict(measured, &history),
+                None => measured,
+            };
+            let decided_on = ahead();
+            let (next, step) = state.step_ahead(self.table, measured, ahead);
             state = next;
+            history.push(state.level);
+            under_way.push_back(state);
+            // As many as there are ticks of delay, and this one.
+            let acting = under_way.pop_front().unwrap_or(state);
             see(&Sample {
                 time_s,
                 x,
                 phase: state.phase,
                 level: state.level,
+                acting: acting.phase,
             });
             let breach = |kind, f| {
                 Some(Breach {
@@ -143,7 +163,7 @@ impl<'a> Replay<'a> {
             if step == Step::Outside {
                 return breach(Violation::Uncovered, x[AXIS_F]);
             }
-            if missed_handover(self.table, state.phase, State(measured))
+            if missed_handover(self.table, state.phase, decided_on)
                 && state.ticks_left + 1 == self.table.header().period_ticks
             {
                 return breach(Violation::Handover, x[AXIS_F]);
@@ -157,10 +177,10 @@ impl<'a> Replay<'a> {
                 }
                 _ => since = None,
             }
-            let power = self.power(usize::from(state.level), share);
+            let power = self.power(usize::from(acting.level), share);
             for piece in &self.pieces {
                 let f = fly(piece, &x, power)[AXIS_F];
-                if let Some(kind) = self.broken(state.phase, f) {
+                if let Some(kind) = self.broken(acting.phase, f) {
                     return breach(kind, f);
                 }
             }

@@ -2,7 +2,8 @@
 
 use firmware::grid::Grid;
 
-use super::model::{Drive, Model};
+use super::knowledge::Drift;
+use super::model::Model;
 use crate::interval::Interval;
 use crate::plant::STATES;
 
@@ -13,28 +14,25 @@ pub(super) struct Cells {
     pub(super) high: [u16; STATES],
 }
 
-/// The cells in which the estimate may lie a period after the real state was in a box; `None` if some lie outside the
-/// grid.
+/// The cells in which the next decision's state may lie a period after this one's was in a box, which holds the errors before the way
+/// ([`super::knowledge`]); `None` if some lie outside the grid.
 pub(super) fn successor(
     grid: &Grid,
     model: &Model,
-    real: &[Interval; STATES],
-    drive: Drive,
+    from: &[Interval; STATES],
+    drift: &Drift,
 ) -> Option<Cells> {
-    let segment = &model.period;
     let mut cells = Cells {
         low: [0; STATES],
         high: [0; STATES],
     };
     for d in 0..STATES {
-        let mut sum = segment.flow.gamma[d] * Interval::point(drive.mid);
-        for (phi, axis) in segment.flow.phi[d].iter().zip(real) {
+        let mut sum = drift.centre[d];
+        for (phi, axis) in model.period.flow.phi[d].iter().zip(from) {
             sum = sum + *phi * *axis;
         }
-        let varying = (segment.absolute[d] * drive.radius).next_up();
-        let spread = (varying + model.error[d]).next_up();
-        let low = (sum.low - spread).next_down();
-        let high = (sum.high + spread).next_up();
+        let low = (sum.low - drift.radius[d]).next_down();
+        let high = (sum.high + drift.radius[d]).next_up();
         cells.low[d] = index(grid, d, low)?;
         cells.high[d] = index(grid, d, high)?;
     }

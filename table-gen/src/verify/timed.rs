@@ -4,6 +4,10 @@
 //! machine decides alike; each part then flies for as long as the input is held: a tick in No control and Fixed, a
 //! period in C1, C2 and Hold. Nothing is rounded to cells. Where a layer grows past a limit, parts of one region and
 //! one decision are merged into a box.
+//!
+//! Where commands act with a delay, a set after the trigger is that of the real states in which the tick's command begins to act: at the
+//! trigger the set flies over the delay with nothing acting, and from then on what is decided on lies within the prediction's error of
+//! it ([`super::knowledge`]).
 
 use std::collections::{BTreeMap, HashMap, HashSet};
 
@@ -15,8 +19,10 @@ use super::event;
 use super::model::Model;
 use super::path::{PathStep, Traces};
 use super::regions::{Part, Regions};
+use super::segment::Linear;
 use super::tally::{Tally, Violation, missed_handover};
 use super::zonotope::Zonotope;
+use crate::plant::STATES;
 
 /// Most parts of a layer before they are merged.
 const LAYER_MAX: usize = 4096;
@@ -57,6 +63,9 @@ struct Decided {
 pub(super) struct Timed<'a> {
     table: &'a TableView<'a>,
     model: &'a Model,
+    /// The real states by what is measured of them: No control.
+    watched: &'a Regions,
+    /// The real states in which a command begins to act by what is decided on.
     regions: &'a Regions,
     traces: Traces,
     tally: Tally,
@@ -81,12 +90,13 @@ impl<'a> Timed<'a> {
     pub(super) fn new(
         table: &'a TableView<'a>,
         model: &'a Model,
-        regions: &'a Regions,
+        [watched, regions]: [&'a Regions; 2],
         settle_ticks: u32,
     ) -> Self {
         Self {
             table,
             model,
+            watched,
             regions,
             traces: Traces::default(),
             tally: Tally::default(),
@@ -107,7 +117,11 @@ impl<'a> Timed<'a> {
         while let Some((tick, nodes)) = self.layers.pop_first() {
             if tick > horizon_ticks {
                 for node in &nodes {
-                    let ran = node.age.since.map_or(0, |since| horizon_ticks - since);
+                    let late = self.model.delay_ticks();
+                    let ran = node
+                        .age
+                        .since
+                        .map_or(0, |since| horizon_ticks - since + late);
                     open_ticks = open_ticks.max(ran);
                 }
                 continue;
@@ -160,7 +174,7 @@ impl<'a> Timed<'a> {
     fn layer(&mut self, tick: u32, nodes: Vec<Node>) {
         let mut decided = Vec::new();
         for node in nodes {
-            self.decide(&node, &mut decided);
+            self.decide(tick, &node, &mut decided);
         }
         if decided.len() > LAYER_MAX {
             decided = merged(decided);
@@ -171,30 +185,71 @@ impl<'a> Timed<'a> {
     }
 
     /// Cuts a node into parts and asks the phase machine about each.
-    fn decide(&self, node: &Node, out: &mut Vec<Decided>) {
+    fn decide(&mut self, tick: u32, node: &Node, out: &mut Vec<Decided>) {
+        let table = self.table;
+        let decided = |part: Part, (next, step)| Decided {
+            trace: node.trace,
+            was: node.state,
+            age: node.age,
+            part,
+            next,
+            step,
+        };
         let ask = |part: Part| {
-            let (next, step) = node.state.step(self.table, part.representative);
-            Decided {
-                trace: node.trace,
-                was: node.state,
-                age: node.age,
-                part,
-                next,
-                step,
-            }
+            let answer = node.state.step(table, part.representative);
+            decided(part, answer)
         };
         if !matches!(node.state.phase, Phase::NoControl | Phase::Fixed) {
             out.extend(self.regions.by_cell(&node.set).into_iter().map(ask));
             return;
         }
-        for part in self.regions.by_band(&node.set, node.state.phase) {
+        let watching = node.state.phase == Phase::NoControl;
+        let regions = if watching { self.watched } else { self.regions };
+        for part in regions.by_band(&node.set, node.state.phase) {
             let whole = ask(part.clone());
             if whole.next == node.state {
                 out.push(whole);
-            } else {
-                out.extend(self.regions.by_cell(&part.set).into_iter().map(ask));
+                continue;
             }
+            if !watching || self.model.knowledge.delay.is_none() {
+                out.extend(self.regions.by_cell(&part.set).into_iter().map(ask));
+                continue;
+            }
+            let Some(ahead) = self.ahead(tick, node, &part.set) else {
+                continue;
+            };
+            let measured = part.representative;
+            out.extend(self.regions.by_cell(&ahead).into_iter().map(|part| {
+                let state = part.representative;
+                let answer = node.state.step_ahead(table, measured, || state);
+                decided(part, answer)
+            }));
         }
+    }
+
+    /// The states at the trigger a delay later; until then nothing acts, and f is bounded.
+    fn ahead(&mut self, tick: u32, node: &Node, set: &Zonotope) -> Option<Zonotope> {
+        let delay = self.model.knowledge.delay.as_ref()?;
+        let step = PathStep {
+            tick,
+            phase: node.state.phase,
+            level: node.state.level,
+            cell: None,
+            set: set.hull_f(),
+        };
+        let trace = self.traces.push(Some(node.trace), step);
+        let magnitude = set.magnitude();
+        if (0..STATES).any(|d| magnitude[d] > delay.reach[d]) {
+            let what =
+                "the state in which No control ends is too far outside the grid to predict from";
+            self.tally
+                .violate(Violation::Uncovered, what, trace, &self.traces);
+            return None;
+        }
+        let none = self.model.drives[usize::from(node.state.level)];
+        let range = delay.segment.frequency(set, none);
+        self.tally.flown(self.model, range, trace, &self.traces);
+        Some(set.after(&delay.segment, none))
     }
 
     /// Follows a part for as long as its input is held.
@@ -262,7 +317,8 @@ impl<'a> Timed<'a> {
             Phase::NoControl => return age,
             Phase::Fixed | Phase::Hold | Phase::Fallback => {
                 if age.first {
-                    self.tally.event_ticks = self.tally.event_ticks.max(tick + 1);
+                    let ticks = tick + 1 + self.model.delay_ticks();
+                    self.tally.event_ticks = self.tally.event_ticks.max(ticks);
                 }
                 age = Age {
                     since: None,
@@ -273,7 +329,8 @@ impl<'a> Timed<'a> {
             }
         }
         if let Some(since) = one.age.since {
-            let ran = tick - since;
+            // Reached when the tick's command begins to act.
+            let ran = tick - since + self.model.delay_ticks();
             self.tally.settle_ticks = self.tally.settle_ticks.max(ran);
             if ran > self.settle_ticks {
                 let what = "I2 is not reached in time";

@@ -6,15 +6,16 @@
 use std::collections::BTreeMap;
 
 use firmware::grid::Cell;
-use firmware::phase::{PhaseState, Step};
+use firmware::phase::{Phase, PhaseState, Step};
 use firmware::table::TableView;
-use firmware::units::State;
+use firmware::units::{AXIS_F, State};
 
 use super::cellset::CellSet;
 use super::event;
 use super::model::Model;
 use super::path::{PathStep, Traces};
 use super::regions::Regions;
+use super::segment::Linear;
 use super::successor::{Cells, index};
 use super::tally::{Tally, Violation};
 use super::zonotope::Zonotope;
@@ -47,7 +48,10 @@ pub(super) struct Watched {
 pub(super) struct Watching<'a> {
     pub(super) table: &'a TableView<'a>,
     pub(super) model: &'a Model,
+    /// The real states by what is measured of them.
     pub(super) regions: &'a Regions,
+    /// The states at the trigger, carried over the delay, by what the first decision goes by.
+    pub(super) first: &'a Regions,
 }
 
 impl Watching<'_> {
@@ -139,6 +143,10 @@ impl Watching<'_> {
     ) {
         let grid = &self.table.header().grid;
         let from = (parent, tick);
+        let Some(ahead) = self.ahead(set, from, tally, out) else {
+            return;
+        };
+        let set = &ahead;
         match self.box_of(set) {
             Some(cells) if count(&cells) > TIGHT_CELLS_MAX => {
                 each(&cells, |cell| {
@@ -149,18 +157,62 @@ impl Watching<'_> {
                     let Some(bounds) = grid.bounds(cell) else {
                         return;
                     };
-                    for (state, f) in self.regions.within(&bounds) {
+                    for (state, f) in self.first.within(&bounds) {
                         self.seed(state, f, from, tally, out);
                     }
                 });
             }
             _ => {
-                for part in self.regions.by_cell(set) {
+                for part in self.first.by_cell(set) {
                     let f = part.set.hull_f();
                     self.seed(part.representative, f, from, tally, out);
                 }
             }
         }
+    }
+
+    /// A set at the trigger as the device expects it when its first command begins to act: the set itself without a delay. Until then
+    /// nothing acts, and f is bounded.
+    fn ahead(
+        &self,
+        set: &Zonotope,
+        (parent, tick): (u32, u32),
+        tally: &mut Tally,
+        out: &mut Watched,
+    ) -> Option<Zonotope> {
+        let Some(delay) = &self.model.knowledge.delay else {
+            return Some(set.clone());
+        };
+        let step = PathStep {
+            tick,
+            phase: Phase::NoControl,
+            level: PhaseState::INITIAL.level,
+            cell: None,
+            set: set.hull_f(),
+        };
+        let trace = out.traces.push(Some(parent), step);
+        let magnitude = set.magnitude();
+        if (0..STATES).any(|d| magnitude[d] > delay.reach[d]) {
+            let what =
+                "the state in which No control ends is too far outside the grid to predict from";
+            tally.violate(Violation::Uncovered, what, trace, &out.traces);
+            return None;
+        }
+        let none = self.model.drives[usize::from(PhaseState::INITIAL.level)];
+        let range = delay.segment.frequency(set, none);
+        tally.flown(self.model, range, trace, &out.traces);
+        Some(set.after(&delay.segment, delay.expected))
+    }
+
+    /// What the machine decides at the trigger on a state of the first decision.
+    fn ask(&self, state: State) -> (PhaseState, Step) {
+        if self.model.knowledge.delay.is_none() {
+            return PhaseState::INITIAL.step(self.table, state);
+        }
+        // What was measured lies below I1; where, does not matter.
+        let mut below = State::default();
+        below.0[AXIS_F] = self.table.header().outer.low_uhz.saturating_sub(1);
+        PhaseState::INITIAL.step_ahead(self.table, below, || state)
     }
 
     /// The box of cells in which the measurement may lie; `None` if some lie outside the grid.
@@ -171,7 +223,7 @@ impl Watching<'_> {
         };
         for d in 0..STATES {
             let bounds = set.bounds(d);
-            let error = self.model.error[d];
+            let error = self.model.knowledge.first[d];
             let grid = &self.table.header().grid;
             cells.low[d] = index(grid, d, (bounds.low - error).next_down())?;
             cells.high[d] = index(grid, d, (bounds.high + error).next_up())?;
@@ -191,7 +243,7 @@ impl Watching<'_> {
         let grid = &self.table.header().grid;
         let cell = grid.quantise(measured);
         let index = cell.and_then(|cell| grid.index(cell));
-        let (next, step) = PhaseState::INITIAL.step(self.table, measured);
+        let (next, step) = self.ask(measured);
         let known = index.is_some_and(|index| out.seen.contains(index));
         if next == PhaseState::INITIAL || (known && step != Step::Outside) {
             return;

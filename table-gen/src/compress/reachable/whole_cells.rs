@@ -2,7 +2,8 @@
 //!
 //! Before the trigger (No control) there is no game. The states in which f can first be seen below I1 are enclosed in
 //! boxes, one for each short piece of time: the flow of the initial box under the loss band, cut at the largest fall of f
-//! within a tick. From there every decision takes a cell to the abstraction's box of cells.
+//! within a tick. From there every decision takes a cell to the abstraction's box of cells. Where commands act with a delay, the boxes
+//! are carried over it without a response: decisions go by the prediction.
 
 use firmware::grid::Cell;
 use firmware::table::{LAWS, Law, TableView};
@@ -10,7 +11,8 @@ use firmware::table::{LAWS, Law, TableView};
 use super::super::CompressError;
 use crate::abstraction::Abstraction;
 use crate::abstraction::affine::AffineAbstraction;
-use crate::flow::{Flow, absolute_integral};
+use crate::delay::{Delay, DelayError};
+use crate::flow::{Flow, absolute_integral, product};
 use crate::game::bitset::BitSet;
 use crate::interval::Interval;
 use crate::plant::{GridPlant, STATES};
@@ -36,7 +38,7 @@ pub fn explore(
     let mut asked: [BitSet; LAWS] = std::array::from_fn(|_| BitSet::new(shape.cells()));
     let mut seen = BitSet::new(shape.cells());
     let mut open: Vec<usize> = Vec::new();
-    for (low, high) in trigger_boxes(spec) {
+    for (low, high) in trigger_boxes(spec)? {
         each_cell(spec, abstraction, low, high, |index| {
             if !seen.contains(index) {
                 seen.insert(index);
@@ -90,8 +92,13 @@ pub fn explore(
     Ok(asked)
 }
 
-/// Boxes \[micro-units\] that hold every state in which a tick first finds f below I1.
-fn trigger_boxes(spec: &Spec) -> Vec<([f64; STATES], [f64; STATES])> {
+/// Lowest and highest of each state \[micro-units\].
+type Box4 = ([f64; STATES], [f64; STATES]);
+
+/// Boxes that hold every state on which the first decision may go: those in which a tick first finds f below I1, or what is predicted
+/// from them.
+fn trigger_boxes(spec: &Spec) -> Result<Vec<Box4>, DelayError> {
+    let delay = Delay::of(spec)?;
     let (a, b) = GridPlant::new(spec).matrices();
     let tick_s = f64::from(spec.sampling.watch_ms()) / 1000.0;
     let piece_s = tick_s / f64::from(PIECES);
@@ -111,7 +118,7 @@ fn trigger_boxes(spec: &Spec) -> Vec<([f64; STATES], [f64; STATES])> {
         std::array::from_fn(|d| 0.5 * (initial.upper[d] - initial.lower[d]) * MICRO);
     let mut varied = [0.0f64; STATES];
     let mut ticks = 0.0;
-    let mut previous: Option<([f64; STATES], [f64; STATES])> = None;
+    let mut previous: Option<(Box4, Box4)> = None;
     let mut boxes = Vec::new();
     while ticks * piece_s < TRIGGER_S_MAX {
         let (mut low, mut high) = ([0.0; STATES], [0.0; STATES]);
@@ -121,36 +128,69 @@ fn trigger_boxes(spec: &Spec) -> Vec<([f64; STATES], [f64; STATES])> {
             low[d] = centre[d].low - spread;
             high[d] = centre[d].high + spread;
         }
+        // The same over the delay, with what belongs together kept together.
+        let ahead = match &delay {
+            None => (low, high),
+            Some(delay) => {
+                let spread = std::array::from_fn(|d| varied[d] + error[d]);
+                delay.predicted(&centre, &product(&delay.flow.phi, &phi), &radius, &spread)
+            }
+        };
         // The hull of two ends of a piece holds the piece but for its bend, far below a cell.
-        if let Some((was_low, was_high)) = previous {
+        if let Some(((was_low, was_high), was_ahead)) = previous {
             let first: [f64; STATES] = std::array::from_fn(|d| low[d].min(was_low[d]));
             let last: [f64; STATES] = std::array::from_fn(|d| high[d].max(was_high[d]));
             if first[0] < below {
                 // Seen at the first tick below: within a tick's fall of the limit.
-                let fall = (high[0] - low[0]).max(0.0) + tick_s * steepest(spec) * MICRO;
+                // Over a delay the box's extent would count again and again; a tick's own fall is enough.
+                let extent = if delay.is_some() {
+                    0.0
+                } else {
+                    (high[0] - low[0]).max(0.0)
+                };
+                let fall = extent + tick_s * steepest(spec) * MICRO;
                 let mut clipped = first;
                 clipped[0] = first[0].max(below - 2.0 * error[0] - fall);
                 let mut end = last;
                 end[0] = last[0].min(below);
                 if clipped[0] <= end[0] {
-                    boxes.push((clipped, end));
+                    boxes.push(match &delay {
+                        None => (clipped, end),
+                        Some(delay) => {
+                            met(joined(ahead, was_ahead), delay.predicted_box(clipped, end))
+                        }
+                    });
                 }
                 if last[0] < below - 2.0 * error[0] - fall {
                     break;
                 }
             }
         }
-        previous = Some((low, high));
+        previous = Some(((low, high), ahead));
         let flowed = crate::flow::apply(&step.phi, &centre);
         centre = std::array::from_fn(|d| flowed[d] + step.gamma[d] * middle);
-        phi = crate::flow::product(&step.phi, &phi);
+        phi = product(&step.phi, &phi);
         for d in 0..STATES {
             // The variation so far is carried on by |exp(A h)|, close to the identity.
             varied[d] += varying[d];
         }
         ticks += 1.0;
     }
-    boxes
+    Ok(boxes)
+}
+
+fn joined((low, high): Box4, other: Box4) -> Box4 {
+    (
+        std::array::from_fn(|d| low[d].min(other.0[d])),
+        std::array::from_fn(|d| high[d].max(other.1[d])),
+    )
+}
+
+fn met((low, high): Box4, other: Box4) -> Box4 {
+    (
+        std::array::from_fn(|d| low[d].max(other.0[d])),
+        std::array::from_fn(|d| high[d].min(other.1[d])),
+    )
 }
 
 /// Steepest fall of f from rest after the largest loss \[Hz/s\].

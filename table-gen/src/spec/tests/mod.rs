@@ -46,7 +46,14 @@ fn leaves(document: &toml::Table) -> BTreeSet<String> {
 fn shipped_specs_load_and_have_the_papers_size() {
     assert_eq!(
         Spec::shipped_names(),
-        ["paper-bi", "paper-uni", "gb-bi", "gb-uni", "gb-bi-normal"]
+        [
+            "paper-bi",
+            "paper-uni",
+            "gb-bi",
+            "gb-bi-delay",
+            "gb-uni",
+            "gb-bi-normal"
+        ]
     );
     for name in Spec::shipped_names() {
         let spec = Spec::load(name, &[]).unwrap();

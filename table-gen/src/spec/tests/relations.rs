@@ -177,3 +177,19 @@ fn the_event_begins_inside_the_grid() {
         "uncertainty.initial.upper",
     );
 }
+
+#[test]
+fn a_delay_is_a_whole_number_of_ticks_that_the_device_remembers() {
+    let key = "uncertainty.actuation_delay_s";
+    with(&["uncertainty.actuation_delay_s=6.4"]).unwrap();
+    let message = refused(&["uncertainty.actuation_delay_s=6.5"], key);
+    assert!(message.contains("at most 64, such as 6.4 s"), "{message}");
+    let message = refused(&["uncertainty.actuation_delay_s=0.15"], key);
+    assert!(message.contains("sampling.watch_s = 0.1 s"), "{message}");
+    refused(&["uncertainty.actuation_delay_s=0.00005"], key);
+    with(&[
+        "uncertainty.actuation_delay_s=0.15",
+        "sampling.watch_s=0.05",
+    ])
+    .unwrap();
+}

@@ -1,5 +1,6 @@
 //! Whole verdicts, on tables made for the purpose.
 
+mod delay;
 mod independence;
 mod mutants;
 mod paper;

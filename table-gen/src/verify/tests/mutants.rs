@@ -22,7 +22,7 @@ fn fails(verdict: &Verdict, claim: &str) {
 /// Cell and level of the decisions that the nominal trajectory takes, in their order.
 fn decisions(bytes: &[u8], spec: &Spec, ticks: u32) -> Vec<(Phase, [u16; 4], u8)> {
     let table = TableView::parse(bytes).unwrap();
-    let model = Model::new(table.header(), spec);
+    let model = Model::new(&table, spec);
     let replay = Replay::new(&table, &model, [-1e9, 1e9], u32::MAX);
     let mut nominal = Constant {
         corner: [0.5; 4],

@@ -183,12 +183,13 @@ fn a_second_checker_agrees_on_a_small_table() {
 
 /// The cells in which the verifier finds that No control can end.
 fn seeds(spec: &Spec, table: &TableView<'_>) -> BTreeSet<[u16; 4]> {
-    let model = Model::new(table.header(), spec);
+    let model = Model::new(table, spec);
     let regions = Regions::new(table.header(), model.error);
     let watching = Watching {
         table,
         model: &model,
         regions: &regions,
+        first: &regions,
     };
     let watched = watching.watch(&mut Tally::default());
     let count = table.header().grid.count();
