@@ -1,5 +1,6 @@
 //! What a table takes of a microcontroller: bytes by part, visits of a lookup, flash left.
 
+pub mod measured;
 pub mod microcontrollers;
 pub mod sweep;
 
@@ -8,6 +9,7 @@ use firmware::table::{CRC_LEN, HEADER_LEN, Law, TableView};
 use serde::Serialize;
 
 use crate::inspect;
+use measured::{Measured, measured};
 use microcontrollers::Microcontroller;
 
 /// Bytes and visits of a law.
@@ -46,12 +48,13 @@ pub struct Budget {
     pub header_bytes: usize,
     /// The laws.
     pub laws: Vec<LawBudget>,
-    /// Flash left on each microcontroller of the list.
+    /// What was measured on the reference core.
+    pub measured: Measured,
+    /// Flash left on each microcontroller of the list, the code not counted: its size depends on the core.
     pub rooms: Vec<Room>,
 }
 
-/// Adds a table up. The reader's code is not counted here: its size depends on the compiler and is measured on the
-/// images.
+/// Adds a table up.
 pub fn budget(table: &TableView<'_>) -> Budget {
     let bytes = table.bytes().len();
     let laws = Law::ALL
@@ -83,6 +86,7 @@ pub fn budget(table: &TableView<'_>) -> Budget {
         table_bytes: bytes,
         header_bytes: HEADER_LEN + prediction_len(table.header().delay_ticks) + CRC_LEN,
         laws,
+        measured: measured(table),
         rooms,
     }
 }

@@ -108,6 +108,17 @@ fn print(budget: &Budget) {
         output::grouped(budget.table_bytes),
         budget.header_bytes
     ));
+    let grouped = |n: u64| output::grouped(n as usize);
+    if let Some(bytes) = budget.measured.core_bytes {
+        output::line(format_args!(
+            "code: {} bytes for the charger without a HAL, measured on a Cortex-M4F",
+            grouped(bytes)
+        ));
+    }
+    output::line(match budget.measured.lookup_instructions {
+        Some(n) => format!("worst lookup: {} instructions, quantiser included, measured on a Cortex-M4F", grouped(n)),
+        None => "worst lookup: not measured for this table (`cargo fw costs` measures the shipped paper-bi)".to_owned(),
+    });
     let mut table = output::table(&["microcontroller", "flash KiB", "left bytes", "taken"]);
     for room in &budget.rooms {
         table.add_row(vec![
