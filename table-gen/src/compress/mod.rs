@@ -229,7 +229,8 @@ impl<'w> Context<'_, 'w> {
         let table = TableView::parse(&image).map_err(EmitError::Rejected)?;
         match reachable::reachable(self.spec, self.abstraction, &table) {
             Ok(_) => Ok(true),
-            Err(CompressError::LeavesTable { .. }) => Ok(false),
+            // Where the closed loop cannot be explored nobody can tell: then nothing is given up either.
+            Err(CompressError::LeavesTable { .. } | CompressError::Unbounded) => Ok(false),
             Err(error) => Err(error),
         }
     }
