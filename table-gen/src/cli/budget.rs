@@ -149,7 +149,8 @@ fn run_sweep(args: &BudgetArgs, spec: &Spec, options: &Options) -> Result<(), Fa
     }
     sweep::mark_pareto(&mut outcomes);
     if let Some(path) = &args.svg {
-        std::fs::write(path, sweep::svg(&outcomes))
+        let picture = sweep::svg(&outcomes).map_err(Failure::BadInput)?;
+        std::fs::write(path, picture)
             .map_err(|error| Failure::BadInput(format!("{}: {error}", path.display())))?;
     }
     if args.output.json {
