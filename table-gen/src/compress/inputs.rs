@@ -96,8 +96,9 @@ impl InputsTask<'_> {
                 Some(_) => self.worst_rank(&solution),
             };
             let short = |inputs: &CompressedInputs| inputs.tree.depth() <= self.depth_goal;
-            let better = next.bytes.len() < best.bytes.len() && short(&next) >= short(&best);
-            if better || short(&next) > short(&best) {
+            // Short paths first, then bytes.
+            let better = (!short(&next), next.bytes.len()) < (!short(&best), best.bytes.len());
+            if better {
                 best = CompressedInputs { steps, ..next };
             }
             if again.ranks == solution.ranks {
