@@ -103,8 +103,8 @@ impl<'t> LawView<'t> {
 
     /// Half-spaces, nodes and entries that this lookup visits, both parts.
     pub fn visits(&self, cell: Cell) -> u16 {
-        let (inside, visits) = self.domain.contains(cell, self.count);
-        if inside {
+        let visits = self.domain.visits(cell, self.count);
+        if self.domain.contains(cell, self.count).0 {
             visits.saturating_add(self.encoding().visits(cell))
         } else {
             visits
