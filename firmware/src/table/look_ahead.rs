@@ -145,16 +145,19 @@ pub(super) fn covers(
     let offset =
         |at: usize| i32::from_le_bytes([bytes[at], bytes[at + 1], bytes[at + 2], bytes[at + 3]]);
     let band = |at: usize| {
-        let end = |at: usize| u32::from(u16::from_le_bytes([bytes[at], bytes[at + 1]]));
-        (end(at), end(at + 2).wrapping_sub(end(at)))
+        let ends = offset(at).cast_unsigned();
+        let (first, last) = (ends & 0xFFFF, ends >> 16);
+        (first, last.wrapping_sub(first))
     };
     let within =
         |index: i32, (first, span): (u32, u32)| (index.cast_unsigned()).wrapping_sub(first) <= span;
     let (done, limit) = (band(4), band(8));
     let shift = u32::from(bytes[0] & LOOK_AHEAD_SHIFT_MAX);
-    let [f, g, l, p] = cell.0.map(i32::from);
-    let [_, g_count, l_count, p_count] = count.map(u32::from);
-    let (mut f, mut g, mut l, mut p) = (f, g, l, p);
+    let [f, g, l, p] = cell.0;
+    let [_, g_count, l_count, p_count] = count;
+    let (g_count, l_count, p_count) = (g_count.into(), l_count.into(), p_count.into());
+    let (mut f, mut g): (i32, i32) = (f.into(), g.into());
+    let (mut l, mut p): (i32, i32) = (l.into(), p.into());
     let (mut g_far, mut l_far, mut p_far) = (g, l, p);
     // Sums cannot overflow while the bounds are on the grid, which `fits` checked; wrapping says so to the compiler.
     let sum = |d: usize, [f, g, l, p]: [i32; STATES]| {

@@ -129,7 +129,8 @@ impl<'t> NodesView<'t> {
     #[inline(always)]
     fn walk(&self, cell: Cell, mut visit: impl FnMut()) -> Option<u8> {
         // The cell relative to the lowest cell of the node's box.
-        let mut rest = cell.0.map(u32::from);
+        let [f, g, l, p] = cell.0;
+        let mut rest: [u32; STATES] = [f.into(), g.into(), l.into(), p.into()];
         let mut nodes = self.nodes;
         while let [head, child, ref below @ ..] = *nodes {
             visit();
