@@ -30,6 +30,7 @@ use crate::observer::{Observer, ObserverConfig};
 use crate::phase::Phase;
 use crate::table::{TableError, TableView};
 use crate::units::{Participation, State};
+use crate::wide::divide;
 use report::log_changes;
 
 /// Most ticks made good by one late tick: longer gaps make the interpolation a guess.
@@ -273,9 +274,13 @@ impl<'t, S: FrequencySource, D: Dispatch, W: Watchdog> Charger<'t, S, D, W> {
         let from = self.f_uhz;
         for n in 1..=due {
             // The missed ticks' frequencies lie on a line.
-            let way = i64::from(f_uhz) - i64::from(from);
-            let at = i64::from(from) + way * i64::from(n) / i64::from(due.max(1));
-            self.advance(at as i32, report);
+            let way = divide(u64::from(f_uhz.abs_diff(from)) * u64::from(n), due.into());
+            let at = if f_uhz < from {
+                from.wrapping_sub_unsigned(way)
+            } else {
+                from.wrapping_add_unsigned(way)
+            };
+            self.advance(at, report);
         }
         if due > 0 {
             // What was held stayed held: one decision, however many ticks were missed.

@@ -5,6 +5,7 @@
 //! resting value `(-f - deadband) / (R_ev D)` and leaves the lag to the hardware.
 
 use crate::units::{MICRO, Participation, State};
+use crate::wide::divide;
 
 /// Baseline droop: none inside the dead band, then in proportion, saturated at the whole fleet.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -28,12 +29,7 @@ impl Droop {
         if below <= 0 || self.full_uhz == 0 {
             return Participation::NONE;
         }
-        let ppm = below * MICRO as i64 / self.full_uhz as i64;
-        if ppm >= MICRO as i64 {
-            Participation::ALL
-        } else {
-            Participation::from_ppm(ppm as u32)
-        }
+        Participation::from_ppm(divide(below as u64 * MICRO as u64, self.full_uhz))
     }
 }
 

@@ -3,7 +3,7 @@
 //! A cell is half-open on every axis, `[lower edge + i·width, lower edge + (i+1)·width)`, in micro-units. Integer
 //! arithmetic makes quantisation exact: there is no tolerance and no state that belongs to two cells.
 
-use crate::units::{STATES, State};
+use crate::units::{AXIS_F, AXIS_G, AXIS_L, AXIS_P, STATES, State};
 
 /// Index of a cell on each axis.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Default)]
@@ -99,25 +99,34 @@ impl Grid {
 
     /// The cell that holds a state, or `None` outside the grid.
     pub const fn quantise(&self, state: State) -> Option<Cell> {
-        let mut cell = [0u16; STATES];
-        let mut axis = 0;
-        while axis < STATES {
-            if state.0[axis] < self.lower_edge[axis] {
-                return None;
-            }
-            // The difference of two i32 with a >= b fits u32.
-            let above = state.0[axis].wrapping_sub(self.lower_edge[axis]) as u32;
-            // The width is not zero; said so that no panic is compiled in.
-            let Some(index) = above.checked_div(self.width[axis]) else {
-                return None;
-            };
-            if index >= self.count[axis] as u32 {
-                return None;
-            }
-            cell[axis] = index as u16;
-            axis += 1;
+        // Not a loop, which would go through memory.
+        let Some(f) = self.index_on(AXIS_F, state) else {
+            return None;
+        };
+        let Some(g) = self.index_on(AXIS_G, state) else {
+            return None;
+        };
+        let Some(l) = self.index_on(AXIS_L, state) else {
+            return None;
+        };
+        let Some(p) = self.index_on(AXIS_P, state) else {
+            return None;
+        };
+        Some(Cell([f, g, l, p]))
+    }
+
+    #[inline(always)]
+    const fn index_on(&self, axis: usize, state: State) -> Option<u16> {
+        if state.0[axis] < self.lower_edge[axis] {
+            return None;
         }
-        Some(Cell(cell))
+        // The difference of two i32 with a >= b fits u32.
+        let above = state.0[axis].wrapping_sub(self.lower_edge[axis]) as u32;
+        // The width is not zero; said so that no panic is compiled in.
+        match above.checked_div(self.width[axis]) {
+            Some(index) if index < self.count[axis] as u32 => Some(index as u16),
+            _ => None,
+        }
     }
 
     /// The half-open interval `[low, high)` of a cell on each axis \[micro-units\]. The cell must be of this grid

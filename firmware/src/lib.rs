@@ -59,3 +59,5 @@ pub mod telemetry;
 pub mod flash;
 
 pub mod link;
+
+mod wide;

@@ -3,6 +3,7 @@
 use crate::event::EventEnd;
 use crate::frequency::gate::GateLimits;
 use crate::table::PlantParameters;
+use crate::wide::divide;
 
 /// Slowest time constants until an initial error of the chain counts as gone: `e^-6` = 0.25 %.
 const TRUST_TIME_CONSTANTS: u64 = 6;
@@ -13,8 +14,12 @@ pub fn trust_ticks(plant: &PlantParameters, tick_ms: u16) -> u16 {
         .governor_time_us
         .max(plant.lag_time_us)
         .max(plant.turbine_time_us);
-    let tick_us = u64::from(tick_ms).max(1) * 1000;
-    let ticks = (TRUST_TIME_CONSTANTS * u64::from(slowest)).div_ceil(tick_us);
+    let tick_us = u32::from(tick_ms).max(1) * 1000;
+    // Rounded up.
+    let ticks = divide(
+        TRUST_TIME_CONSTANTS * u64::from(slowest) + u64::from(tick_us - 1),
+        tick_us,
+    );
     u16::try_from(ticks).unwrap_or(u16::MAX)
 }
 

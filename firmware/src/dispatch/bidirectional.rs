@@ -6,6 +6,7 @@
 
 use super::{Dispatch, DispatchError, LimitSource, Limits, SetPoint};
 use crate::units::{MICRO, Participation};
+use crate::wide::divide;
 
 /// A power stage that follows a signed set-point.
 ///
@@ -28,15 +29,16 @@ pub const fn power_w(participation: Participation, charge_w: u32, discharge_w: u
         charge_w
     } else {
         LARGEST_W
-    } as i64;
+    };
     let discharge = if discharge_w < LARGEST_W {
         discharge_w
     } else {
         LARGEST_W
-    } as i64;
+    };
     // Given up: rounded down, so never past the discharge limit.
-    let given = (charge + discharge) * participation.ppm() as i64 / MICRO as i64;
-    (charge - given) as i32
+    let span = (charge + discharge) as u64;
+    let given = divide(span * participation.ppm() as u64, MICRO as u32);
+    charge.wrapping_sub(given).cast_signed()
 }
 
 /// A bidirectional charger.

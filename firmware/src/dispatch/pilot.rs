@@ -10,6 +10,8 @@
 //! Up to 52.5 A, where the upper line starts, 51 A is the most that a duty stands for. Every rounding is downwards, so that the
 //! current offered never exceeds the limit.
 
+use crate::wide::divide;
+
 use embedded_hal::pwm::SetDutyCycle;
 
 /// Frequency of the pilot \[Hz\].
@@ -79,7 +81,8 @@ impl<P: SetDutyCycle> Pilot<P> {
         if ppm == WHOLE_PPM {
             return self.pwm.set_duty_cycle_fully_on();
         }
-        let steps = u64::from(self.pwm.max_duty_cycle()) * u64::from(ppm) / u64::from(WHOLE_PPM);
+        let steps = u64::from(self.pwm.max_duty_cycle()) * u64::from(ppm);
+        let steps = divide(steps, WHOLE_PPM);
         // At most max_duty_cycle, which is 16 bits.
         self.pwm.set_duty_cycle(steps as u16)
     }

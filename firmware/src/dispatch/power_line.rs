@@ -12,7 +12,9 @@
 //! controller restarts must not be read as full power in either direction. One line crosses an isolation barrier by one
 //! optocoupler. The power stage decodes linearly and must treat what it cannot read as no power.
 
-use core::num::{NonZeroU32, NonZeroU64};
+use crate::wide::divide;
+
+use core::num::NonZeroU32;
 
 use embedded_hal::pwm::SetDutyCycle;
 
@@ -39,9 +41,12 @@ impl<P: SetDutyCycle> PowerLine<P> {
     /// either direction. Powers past the span count as the span.
     fn steps(&self, power_w: i32, steps_max: u16) -> u16 {
         let power = power_w.unsigned_abs().min(self.span_w.get());
-        // The span is 40 % = 2/5 of the period: at most 2^32 * 2 * 2^16 over 5 * 2^32.
-        let five_spans = NonZeroU64::from(self.span_w).saturating_mul(FIVE);
-        let swing = (u64::from(power) * 2 * u64::from(steps_max) / five_spans) as u16;
+        // The span is 40 % = 2/5 of the period, and the power at most the span.
+        let spans = divide(
+            u64::from(power) * 2 * u64::from(steps_max),
+            self.span_w.get(),
+        );
+        let swing = (spans / 5) as u16;
         if power_w < 0 {
             steps_max.div_ceil(2).saturating_sub(swing)
         } else {
@@ -49,8 +54,6 @@ impl<P: SetDutyCycle> PowerLine<P> {
         }
     }
 }
-
-const FIVE: NonZeroU64 = NonZeroU64::MIN.saturating_add(4);
 
 impl<P: SetDutyCycle> PowerStage for PowerLine<P> {
     type Error = P::Error;

@@ -11,6 +11,7 @@ use super::fleet::Threshold;
 use super::pilot::{CURRENT_MAX_MA, CURRENT_MIN_MA, Pilot};
 use super::{Dispatch, DispatchError, LimitSource, Limits, SetPoint};
 use crate::units::{MICRO, Participation};
+use crate::wide::divide;
 
 /// Current to offer \[mA\], 0 for a pause: the rule alone, without hardware.
 pub const fn current_ma(participation: Participation, limit_ma: u32, threshold: Threshold) -> u32 {
@@ -23,7 +24,7 @@ pub const fn current_ma(participation: Participation, limit_ma: u32, threshold: 
         return 0;
     }
     let kept_ppm = MICRO as u32 - participation.ppm();
-    let wanted = (limit as u64 * kept_ppm as u64 / MICRO as u64) as u32;
+    let wanted = divide(limit as u64 * kept_ppm as u64, MICRO as u32);
     if wanted >= CURRENT_MIN_MA {
         wanted
     } else if threshold.is_within(wanted, CURRENT_MIN_MA) {

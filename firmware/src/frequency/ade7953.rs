@@ -23,6 +23,7 @@ use embedded_hal::spi::{Operation, SpiDevice};
 
 use super::{FrequencyError, FrequencySource, NOMINAL_HZ, Reading};
 use crate::units::MICRO;
+use crate::wide::divide;
 
 /// Address of PERIOD.
 pub const PERIOD: u16 = 0x10E;
@@ -140,9 +141,8 @@ pub const fn deviation_uhz(period: u16) -> Result<i32, FrequencyError> {
     if period == 0 || period == u16::MAX {
         return Err(FrequencyError::NoSignal);
     }
-    let counts = period as i64 + 1;
-    let deviation = (PERIOD_CLOCK_HZ as i64 - NOMINAL_HZ as i64 * counts) * MICRO as i64;
-    let deviation = deviation.div_euclid(counts);
+    let frequency = divide(PERIOD_CLOCK_HZ as u64 * MICRO as u64, period as u32 + 1);
+    let deviation = frequency as i64 - NOMINAL_HZ as i64 * MICRO as i64;
     // PERIOD = 1 would be 111.9 kHz: past 32 bits of µHz, and out of any range.
     Ok(if deviation > i32::MAX as i64 {
         i32::MAX

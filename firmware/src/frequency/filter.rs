@@ -4,6 +4,8 @@
 //! which is right for a source that averages over a tick itself (zero crossings over 100 ms): every tick of lag acts like
 //! a tick of actuation delay.
 
+use crate::wide::divide;
+
 /// Most ticks averaged.
 pub const FILTER_TICKS_MAX: usize = 8;
 
@@ -38,9 +40,12 @@ impl Filter {
         if self.ticks == 1 {
             return deviation_uhz;
         }
-        let sum: i64 = self.samples.iter().map(|sample| i64::from(*sample)).sum();
-        let count = self.samples.len().max(1) as i64;
-        sum.div_euclid(count) as i32
+        // Raised by 2^31, so that nothing is negative and the quotient is rounded down.
+        let raised = |sample: &i32| u64::from(sample.wrapping_sub(i32::MIN).cast_unsigned());
+        let sum: u64 = self.samples.iter().map(raised).sum();
+        divide(sum, self.samples.len() as u32)
+            .cast_signed()
+            .wrapping_add(i32::MIN)
     }
 
     /// Forgets the past.

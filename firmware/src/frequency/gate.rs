@@ -3,6 +3,8 @@
 //! The rate limit is against the last *accepted* reading and grows with the time since: a single spike is rejected, and
 //! a true jump (an island that reconnects, say) is believed again once the grid's inertia would have allowed it.
 
+use crate::wide::divide;
+
 use core::num::NonZeroU16;
 
 use super::{FrequencyError, Reading};
@@ -121,9 +123,9 @@ impl Gate {
     /// Largest change since the accepted reading that is possible \[µHz\].
     fn allowed_uhz(&self) -> u32 {
         let elapsed_ms = u32::from(self.ticks_since).saturating_mul(u32::from(self.tick_ms));
-        let ramp = u64::from(self.limits.rate_uhz_per_s) * u64::from(elapsed_ms) / 1000;
-        let allowed = ramp + 2 * u64::from(self.noise_uhz);
-        u32::try_from(allowed).unwrap_or(u32::MAX)
+        let rate = self.limits.rate_uhz_per_s;
+        let ramp = divide(u64::from(rate) * u64::from(elapsed_ms), 1000);
+        ramp.saturating_add(self.noise_uhz.saturating_mul(2))
     }
 }
 

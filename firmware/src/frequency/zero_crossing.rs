@@ -13,6 +13,7 @@ use core::num::NonZeroU16;
 
 use super::{FrequencyError, FrequencySource, NOMINAL_HZ, Reading};
 use crate::units::MICRO;
+use crate::wide::divide;
 
 /// Most cycles of a window.
 pub const CYCLES_MAX: usize = 16;
@@ -100,9 +101,10 @@ impl ZeroCrossing {
 impl FrequencySource for ZeroCrossing {
     fn error_uhz(&self) -> u32 {
         // One timer tick in a window of `cycles` nominal periods: 50 Hz * 50 / (cycles * timer_hz).
-        let squared = u64::from(NOMINAL_HZ) * u64::from(NOMINAL_HZ) * MICRO as u64;
-        let window = u64::from(self.cycles) * u64::from(self.timer_hz);
-        (squared / window.max(1) + 1) as u32 + u32::from(self.clock_ppm) * NOMINAL_HZ
+        const SQUARED: u32 = NOMINAL_HZ * NOMINAL_HZ * MICRO as u32;
+        // More than 32 bits of timer ticks divide to zero, as `u32::MAX` does.
+        let window = u32::from(self.cycles).saturating_mul(self.timer_hz);
+        SQUARED / window.max(1) + 1 + u32::from(self.clock_ppm) * NOMINAL_HZ
     }
 
     fn lag_ms(&self) -> u16 {
@@ -123,10 +125,12 @@ impl FrequencySource for ZeroCrossing {
             return Err(FrequencyError::NoSignal);
         }
         // Not zero: every period of the window was at least `shortest`.
-        let window = i64::from(last.wrapping_sub(*first)).max(1);
-        let ticks = i64::from(self.cycles) * i64::from(self.timer_hz);
-        let deviation = (ticks - i64::from(NOMINAL_HZ) * window) * i64::from(MICRO);
-        let deviation_uhz = deviation.div_euclid(window) as i32;
+        let window = last.wrapping_sub(*first);
+        let ticks = u64::from(self.cycles) * u64::from(self.timer_hz);
+        let frequency_uhz = divide(ticks * MICRO as u64, window);
+        let deviation_uhz = frequency_uhz
+            .wrapping_sub(NOMINAL_HZ * MICRO as u32)
+            .cast_signed();
         let age = now_ms.wrapping_sub(last_ms);
         Ok(Reading {
             deviation_uhz,

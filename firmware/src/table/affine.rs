@@ -8,9 +8,9 @@
 //! The value is `constant + Σ factor·index`. It is checked once that no cell of the grid takes any partial sum out of
 //! 32 bits; after that the arithmetic cannot overflow.
 
-use super::bytes::{i32_at, u16_at};
+use super::bytes::array_at;
 use crate::grid::{Cell, Grid};
-use crate::units::STATES;
+use crate::units::{AXIS_F, AXIS_G, AXIS_L, AXIS_P, STATES};
 
 /// Bytes of a function.
 pub const AFFINE_LEN: usize = 2 * STATES + 4;
@@ -28,15 +28,13 @@ pub struct AffineFunction {
 }
 
 impl AffineFunction {
-    /// Reads a function; the slice must hold [`AFFINE_LEN`] bytes (zeros are read past its end).
+    /// Reads a function; the slice must hold [`AFFINE_LEN`] bytes (all is zero if it is shorter).
     pub fn read(bytes: &[u8]) -> Self {
-        let mut factors = [0i16; STATES];
-        for (axis, factor) in factors.iter_mut().enumerate() {
-            *factor = u16_at(bytes, 2 * axis).cast_signed();
-        }
+        let bytes: [u8; AFFINE_LEN] = array_at(bytes, 0).unwrap_or_default();
+        let factor = |at: usize| i16::from_le_bytes([bytes[at], bytes[at + 1]]);
         Self {
-            factors,
-            constant: i32_at(bytes, 2 * STATES),
+            factors: [factor(0), factor(2), factor(4), factor(6)],
+            constant: i32::from_le_bytes([bytes[8], bytes[9], bytes[10], bytes[11]]),
         }
     }
 
@@ -61,11 +59,13 @@ impl AffineFunction {
 
     /// Value at a cell; wraps for a cell of another grid.
     pub fn value(&self, cell: Cell) -> i32 {
-        let mut sum = self.constant;
-        for (factor, index) in self.factors.iter().zip(cell.0) {
-            sum = sum.wrapping_add(i32::from(*factor).wrapping_mul(i32::from(index)));
-        }
-        sum
+        let term = |axis: usize| i32::from(self.factors[axis]).wrapping_mul(cell.0[axis].into());
+        // Not a loop, which would go through memory.
+        self.constant
+            .wrapping_add(term(AXIS_F))
+            .wrapping_add(term(AXIS_G))
+            .wrapping_add(term(AXIS_L))
+            .wrapping_add(term(AXIS_P))
     }
 
     /// The value as an input level: without its fraction, clamped to `0..levels`.

@@ -122,7 +122,15 @@ impl<'t> DomainView<'t> {
         })
     }
 
-    /// Whether a cell of the grid with `count` cells is covered, and how many nodes, half-spaces and steps were visited.
+    /// Nodes, half-spaces and steps that the question whether a cell is covered visits.
+    pub(super) fn visits(&self, cell: Cell, count: [u16; STATES]) -> u16 {
+        match self {
+            Self::InInputs => 0,
+            Self::Tree { nodes, .. } => nodes.visits(cell) + self.contains(cell, count).1,
+        }
+    }
+
+    /// Whether a cell of the grid with `count` cells is covered, and how many half-spaces and steps were visited.
     #[inline]
     pub(super) fn contains(&self, cell: Cell, count: [u16; STATES]) -> (bool, u16) {
         let Self::Tree {
@@ -134,17 +142,16 @@ impl<'t> DomainView<'t> {
         else {
             return (true, 0);
         };
-        let Some((leaf, visits)) = nodes.leaf(cell) else {
+        let Some(leaf) = nodes.leaf(cell) else {
             return (false, 0);
         };
         let (first, asked) = match leaf {
-            LEAF_OUTSIDE => return (false, visits),
-            LEAF_INSIDE => return (true, visits),
+            LEAF_OUTSIDE => return (false, 0),
+            LEAF_INSIDE => return (true, 0),
             LEAF_HULL => (0, *hull),
             LEAF_LOOK_AHEAD.. => {
                 let ahead = aheads.get(usize::from(leaf - LEAF_LOOK_AHEAD));
-                let (inside, steps) = ahead.map_or((false, 0), |ahead| covers(ahead, cell, count));
-                return (inside, visits + steps);
+                return ahead.map_or((false, 0), |ahead| covers(ahead, cell, count));
             }
             space => (space - LEAF_HALF_SPACE, 1),
         };
@@ -152,7 +159,7 @@ impl<'t> DomainView<'t> {
             .chunks_exact(AFFINE_LEN)
             .skip(first.into())
             .take(asked.into());
-        let mut visits = visits;
+        let mut visits = 0;
         for space in asked {
             visits += 1;
             if AffineFunction::read(space).value(cell) < 0 {

@@ -91,7 +91,9 @@ impl<'t> LawView<'t> {
 
     /// Input level at a cell; `None` outside the law's domain, and for a cell of another grid.
     pub fn lookup(&self, cell: Cell) -> Option<u8> {
-        let of_grid = cell.0.iter().zip(self.count).all(|(at, count)| *at < count);
+        let [f, g, l, p] = cell.0;
+        let [f_count, g_count, l_count, p_count] = self.count;
+        let of_grid = f < f_count && g < g_count && l < l_count && p < p_count;
         if !of_grid || !self.domain.contains(cell, self.count).0 {
             return None;
         }
@@ -103,8 +105,8 @@ impl<'t> LawView<'t> {
 
     /// Half-spaces, nodes and entries that this lookup visits, both parts.
     pub fn visits(&self, cell: Cell) -> u16 {
-        let (inside, visits) = self.domain.contains(cell, self.count);
-        if inside {
+        let visits = self.domain.visits(cell, self.count);
+        if self.domain.contains(cell, self.count).0 {
             visits.saturating_add(self.encoding().visits(cell))
         } else {
             visits

@@ -27,9 +27,11 @@
 //! The device trusts it no further than any other byte of the table: whether the answers are right is for the generator
 //! and the verifier, which ask for every cell.
 
+use core::hint::black_box;
+
 use super::bytes::{array_at, i32_at, u16_at};
 use crate::grid::{Cell, Grid};
-use crate::units::{AXIS_F, STATES};
+use crate::units::{AXIS_F, AXIS_G, AXIS_L, AXIS_P, STATES};
 
 /// Bytes of a look-ahead.
 pub const LOOK_AHEAD_LEN: usize = 72;
@@ -38,6 +40,8 @@ pub const LOOK_AHEAD_SHIFT_MAX: u8 = 15;
 /// Most steps.
 pub const LOOK_AHEAD_STEPS_MAX: u8 = 15;
 
+const DONE_AT: usize = 4;
+const LIMIT_AT: usize = 8;
 const FACTORS_AT: usize = 12;
 const NEAR_AT: usize = 44;
 const FAR_AT: usize = 60;
@@ -138,68 +142,88 @@ pub(super) fn covers(
     cell: Cell,
     count: [u16; STATES],
 ) -> (bool, u16) {
-    let factor = |d: usize, j: usize| {
-        let at = FACTORS_AT + 2 * (STATES * d + j);
-        i32::from(i16::from_le_bytes([bytes[at], bytes[at + 1]]))
-    };
-    let offset =
-        |at: usize| i32::from_le_bytes([bytes[at], bytes[at + 1], bytes[at + 2], bytes[at + 3]]);
-    let band = |at: usize| {
-        let end = |at: usize| u32::from(u16::from_le_bytes([bytes[at], bytes[at + 1]]));
-        (end(at), end(at + 2).wrapping_sub(end(at)))
-    };
-    let within =
-        |index: i32, (first, span): (u32, u32)| (index.cast_unsigned()).wrapping_sub(first) <= span;
-    let (done, limit) = (band(4), band(8));
-    let shift = u32::from(bytes[0] & LOOK_AHEAD_SHIFT_MAX);
-    let [f, g, l, p] = cell.0.map(i32::from);
-    let [_, g_count, l_count, p_count] = count.map(u32::from);
-    let (mut f, mut g, mut l, mut p) = (f, g, l, p);
+    let [f, g, l, p] = cell.0;
+    let (mut f, mut g): (i32, i32) = (f.into(), g.into());
+    let (mut l, mut p): (i32, i32) = (l.into(), p.into());
     let (mut g_far, mut l_far, mut p_far) = (g, l, p);
-    // Sums cannot overflow while the bounds are on the grid, which `fits` checked; wrapping says so to the compiler.
-    let sum = |d: usize, [f, g, l, p]: [i32; STATES]| {
-        factor(d, 0)
-            .wrapping_mul(f)
-            .wrapping_add(factor(d, 1).wrapping_mul(g))
-            .wrapping_add(factor(d, 2).wrapping_mul(l))
-            .wrapping_add(factor(d, 3).wrapping_mul(p))
-    };
-    if !within(f, limit) {
+    if !within(f, bytes, LIMIT_AT) {
         return (false, 0);
     }
-    for step in 0..u16::from(bytes[1]) {
-        if within(f, done) {
+    let steps = u16::from(bytes[1]);
+    for step in 0..steps {
+        // Read anew at every step: kept over the steps, the factors would only go from flash to the stack.
+        let bytes = black_box(bytes);
+        if within(f, bytes, DONE_AT) {
             return (true, step);
         }
-        let x = [f, g, l, p];
-        let near = |d: usize| sum(d, x).wrapping_add(offset(NEAR_AT + 4 * d)) >> shift;
-        let far = |d: usize, apart: i32| {
-            let sum = sum(d, x).wrapping_add(apart);
-            sum.wrapping_add(offset(FAR_AT + 4 * (d - 1))) >> shift
+        let shift = u32::from(bytes[0] & LOOK_AHEAD_SHIFT_MAX);
+        let factor = |d: usize, j: usize| {
+            let at = FACTORS_AT + 2 * (STATES * d + j);
+            i32::from(i16::from_le_bytes([bytes[at], bytes[at + 1]]))
         };
-        let apart = [
-            g_far.wrapping_sub(g),
-            l_far.wrapping_sub(l),
-            p_far.wrapping_sub(p),
-        ];
-        let of = |d: usize, j: usize| factor(d, j).wrapping_mul(apart[j - 1]);
-        g_far = far(1, of(1, 1));
-        l_far = far(2, of(2, 1).wrapping_add(of(2, 2)));
-        p_far = far(3, of(3, 1).wrapping_add(of(3, 2)).wrapping_add(of(3, 3)));
-        (f, g, l, p) = (near(0), near(1), near(2), near(3));
-        let on_grid = |index: i32, count: u32| index.cast_unsigned() < count;
-        let kept = within(f, limit)
-            && on_grid(g, g_count)
-            && on_grid(g_far, g_count)
-            && on_grid(l, l_count)
-            && on_grid(l_far, l_count)
-            && on_grid(p, p_count)
-            && on_grid(p_far, p_count);
-        if !kept {
+        // Sums cannot overflow while the bounds are on the grid, which `fits` checked; wrapping says so to the compiler.
+        let sum = |d: usize| {
+            factor(d, 0)
+                .wrapping_mul(f)
+                .wrapping_add(factor(d, 1).wrapping_mul(g))
+                .wrapping_add(factor(d, 2).wrapping_mul(l))
+                .wrapping_add(factor(d, 3).wrapping_mul(p))
+        };
+        let near = |d: usize, sum: i32| sum.wrapping_add(word(bytes, NEAR_AT + 4 * d)) >> shift;
+        let far = |d: usize, sum: i32| sum.wrapping_add(word(bytes, FAR_AT + 4 * d - 4)) >> shift;
+        let on_grid = |index: i32, axis: usize| index.cast_unsigned() < u32::from(count[axis]);
+        let f_next = near(AXIS_F, sum(AXIS_F));
+        if !within(f_next, bytes, LIMIT_AT) {
+            return (false, step + 1);
+        }
+        let g_sum = sum(AXIS_G);
+        let l_sum = sum(AXIS_L);
+        let p_sum = sum(AXIS_P);
+        let apart = g_far.wrapping_sub(g);
+        let mut g_apart = factor(1, 1).wrapping_mul(apart);
+        let mut l_apart = factor(2, 1).wrapping_mul(apart);
+        let mut p_apart = factor(3, 1).wrapping_mul(apart);
+        let apart = l_far.wrapping_sub(l);
+        l_apart = l_apart.wrapping_add(factor(2, 2).wrapping_mul(apart));
+        p_apart = p_apart.wrapping_add(factor(3, 2).wrapping_mul(apart));
+        let apart = p_far.wrapping_sub(p);
+        p_apart = p_apart.wrapping_add(factor(3, 3).wrapping_mul(apart));
+        g_apart = g_apart.wrapping_add(g_sum);
+        f = f_next;
+        (g, g_far) = (near(AXIS_G, g_sum), far(AXIS_G, g_apart));
+        if !on_grid(g, AXIS_G) || !on_grid(g_far, AXIS_G) {
+            return (false, step + 1);
+        }
+        (l, l_far) = (
+            near(AXIS_L, l_sum),
+            far(AXIS_L, l_apart.wrapping_add(l_sum)),
+        );
+        if !on_grid(l, AXIS_L) || !on_grid(l_far, AXIS_L) {
+            return (false, step + 1);
+        }
+        (p, p_far) = (
+            near(AXIS_P, p_sum),
+            far(AXIS_P, p_apart.wrapping_add(p_sum)),
+        );
+        if !on_grid(p, AXIS_P) || !on_grid(p_far, AXIS_P) {
             return (false, step + 1);
         }
     }
-    (true, u16::from(bytes[1]))
+    (true, steps)
+}
+
+/// Whether an index lies in the band of two cells at an offset: first, last.
+#[inline(always)]
+fn within(index: i32, bytes: &[u8; LOOK_AHEAD_LEN], at: usize) -> bool {
+    let ends = word(bytes, at).cast_unsigned();
+    let (first, last) = (ends & 0xFFFF, ends >> 16);
+    index.cast_unsigned().wrapping_sub(first) <= last.wrapping_sub(first)
+}
+
+/// A word at an offset that is known when it is compiled.
+#[inline(always)]
+fn word(bytes: &[u8; LOOK_AHEAD_LEN], at: usize) -> i32 {
+    i32::from_le_bytes([bytes[at], bytes[at + 1], bytes[at + 2], bytes[at + 3]])
 }
 
 #[cfg(test)]

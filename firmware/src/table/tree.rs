@@ -111,33 +111,40 @@ impl<'t> NodesView<'t> {
         }
     }
 
-    /// Leaf of a cell, and the nodes visited. `None` does not occur in a tree that was checked.
-    ///
+    /// Leaf of a cell. `None` does not occur in a tree that was checked.
+    #[inline(never)]
+    pub(super) fn leaf(&self, cell: Cell) -> Option<u8> {
+        self.walk(cell, || {})
+    }
+
+    /// The nodes visited on the way to the leaf of a cell.
+    pub(super) fn visits(&self, cell: Cell) -> u16 {
+        let mut visits = 0;
+        let _leaf = self.walk(cell, || visits += 1);
+        visits
+    }
+
     /// The same walk as over [`Node::read`] (a test compares them), without taking each node apart first: about twenty
-    /// instructions a node.
-    #[inline]
-    pub(super) fn leaf(&self, cell: Cell) -> Option<(u8, u16)> {
-        if let [only] = self.nodes {
-            return Some((*only, 1));
-        }
+    /// instructions a node. Every turn shortens what is left of the nodes, so the walk ends.
+    #[inline(always)]
+    fn walk(&self, cell: Cell, mut visit: impl FnMut()) -> Option<u8> {
         // The cell relative to the lowest cell of the node's box.
-        let mut rest = cell.0;
+        let [f, g, l, p] = cell.0;
+        let mut rest: [u32; STATES] = [f.into(), g.into(), l.into(), p.into()];
         let mut nodes = self.nodes;
-        for visits in 1..=self.depth {
-            let [head, child, ref below @ ..] = *nodes else {
-                return None;
-            };
+        while let [head, child, ref below @ ..] = *nodes {
+            visit();
             let (delta, child, below) = match u16::from(head >> DELTA_SHIFT) {
                 DELTA_ESCAPE => long_delta(child, below)?,
                 delta => (delta, child, below),
             };
+            let (delta, flag) = (u32::from(delta), head & FLAG != 0);
             let index = &mut rest[usize::from(head) % STATES];
-            let flag = head & FLAG != 0;
             if *index < delta {
                 // Left: with the flag a child below 64 is the right leaf, and the left child follows.
                 match (flag, child) {
-                    (false, 0..LEAF_VALUES) => return Some((child, visits)),
-                    (true, LEAF_VALUES..) => return Some((child - LEAF_VALUES, visits)),
+                    (false, 0..LEAF_VALUES) => return Some(child),
+                    (true, LEAF_VALUES..) => return Some(child - LEAF_VALUES),
                     (false, BYTE_ESCAPE) => nodes = below.get(3..)?,
                     _ => nodes = below,
                 }
@@ -145,14 +152,16 @@ impl<'t> NodesView<'t> {
                 *index -= delta;
                 match (flag, child) {
                     (false, 0..LEAF_VALUES) => nodes = below,
-                    (true, 0..LEAF_VALUES) => return Some((child, visits)),
-                    (true, _) => return Some((*below.first()?, visits)),
+                    (true, 0..LEAF_VALUES) => return Some(child),
+                    (true, _) => return below.first().copied(),
                     (false, BYTE_ESCAPE) => nodes = long_skip(below)?,
                     (false, _) => nodes = below.get(usize::from(child - SHORT_SKIP)..)?,
                 }
             }
         }
-        None
+        // A tree of one leaf.
+        visit();
+        nodes.first().copied()
     }
 
     pub(super) fn depth(&self) -> u16 {
@@ -230,7 +239,7 @@ impl<'t> TreeView<'t> {
 
 impl Encoding for TreeView<'_> {
     fn level(&self, cell: Cell) -> Option<u8> {
-        let (leaf, _) = self.nodes.leaf(cell)?;
+        let leaf = self.nodes.leaf(cell)?;
         match leaf.checked_sub(LEAF_AFFINE) {
             None => Some(leaf),
             Some(law) => {
@@ -241,7 +250,7 @@ impl Encoding for TreeView<'_> {
     }
 
     fn visits(&self, cell: Cell) -> u16 {
-        self.nodes.leaf(cell).map_or(0, |(_, visits)| visits)
+        self.nodes.visits(cell)
     }
 
     fn worst_visits(&self) -> u16 {
@@ -328,8 +337,9 @@ mod tests {
             let nodes = grow(&mut recipe.into_iter(), 9);
             let view = NodesView::parse(&nodes, |_| true).unwrap();
             for cell in cells {
-                let found = view.leaf(Cell(cell));
-                prop_assert_eq!(found, Some(slowly(&nodes, Cell(cell))));
+                let (leaf, visits) = slowly(&nodes, Cell(cell));
+                prop_assert_eq!(view.leaf(Cell(cell)), Some(leaf));
+                prop_assert_eq!(view.visits(Cell(cell)), visits);
             }
         }
     }
