@@ -10,7 +10,8 @@
 //!
 //! ## Trust
 //! After a start nobody knows the governor chain: the grid may be in the middle of an event. The observer's initial error
-//! dies out with its slowest time constant, so the droop, which needs f alone, is in force for [`trust_ticks`].
+//! dies out with its slowest time constant, so the droop, which needs f alone, is in force for [`trust_ticks`]; at least for the
+//! table's delay, after which every command under way is one that was noted since.
 
 mod config;
 mod report;
@@ -97,18 +98,19 @@ impl<'t, S: FrequencySource, D: Dispatch, W: Watchdog> Charger<'t, S, D, W> {
         config: ChargerConfig,
         cause: ResetCause,
     ) -> Self {
-        let (tick_ms, droop, plant, event) = match &table {
+        let (tick_ms, delay_ticks, droop, plant, event) = match &table {
             Ok(view) => {
                 let header = view.header();
                 let event = EventWatch::new(config.event_end, header.outer, header.tick_ms);
                 (
                     header.tick_ms,
+                    header.delay_ticks,
                     header.droop,
                     Some(header.plant),
                     Some(event),
                 )
             }
-            Err(_) => (TICK_MS_DEFAULT, Droop::PAPER, None, None),
+            Err(_) => (TICK_MS_DEFAULT, 0, Droop::PAPER, None, None),
         };
         let observer = plant.and_then(|plant| {
             let coefficients = ObserverConfig::new(&plant, tick_ms).ok()?;
@@ -119,9 +121,9 @@ impl<'t, S: FrequencySource, D: Dispatch, W: Watchdog> Charger<'t, S, D, W> {
         if unusable {
             table = Err(TableError::BadField { offset: 108 });
         }
-        let warm_up_ticks = config
-            .warm_up_ticks
-            .unwrap_or_else(|| plant.map_or(0, |plant| trust_ticks(&plant, tick_ms)));
+        let warm_up_ticks = config.warm_up_ticks.unwrap_or_else(|| {
+            plant.map_or(0, |plant| trust_ticks(&plant, tick_ms).max(delay_ticks))
+        });
         let gate = Gate::new(
             config.gate,
             tick_ms,
@@ -288,6 +290,8 @@ impl<'t, S: FrequencySource, D: Dispatch, W: Watchdog> Charger<'t, S, D, W> {
             self.control.skip(missed);
             self.warm_up_left = self.warm_up_left.saturating_sub(missed);
             self.decide(due, report);
+            // The one place that notes a command: whatever was decided, and by whom.
+            report.participation = self.control.impose(report.participation);
         }
     }
 
@@ -311,25 +315,24 @@ impl<'t, S: FrequencySource, D: Dispatch, W: Watchdog> Charger<'t, S, D, W> {
             self.warm_up_left -= 1;
             report.mode = Mode::WarmUp;
             report.phase = Phase::Fallback;
-            let droop = self.droop.participation(report.state);
-            report.participation = self.control.impose(droop);
+            report.participation = self.droop.participation(report.state);
             return;
         }
         let f_uhz = report.state.frequency_uhz();
         // Still the last tick's participation.
         let before = report.participation;
         if let Some(event) = &mut self.event {
-            match event.course(f_uhz, before, due) {
+            match event.course(f_uhz, due) {
                 Course::Release(participation) => {
                     report.participation = participation;
                     report.mode = Mode::Release;
                     return;
                 }
-                Course::Anew | Course::Over => self.control.reset(),
+                Course::Anew | Course::Over => self.control.end_event(),
                 Course::Follow => {}
             }
         }
-        let action = self.control.step(report.state);
+        let action = self.control.ask(report.state);
         report.participation = action.participation;
         report.phase = action.phase;
         report.mode = match action.source {
@@ -343,7 +346,7 @@ impl<'t, S: FrequencySource, D: Dispatch, W: Watchdog> Charger<'t, S, D, W> {
         if let Some(event) = &mut self.event {
             let responding = action.phase != Phase::NoControl;
             let covered = action.source == Source::Table;
-            if event.ends(f_uhz, responding, covered, due) {
+            if event.ends(f_uhz, responding, covered, before, due) {
                 report.participation = before;
                 report.mode = Mode::Release;
             }

@@ -5,7 +5,7 @@
 //!
 //! Where the table's commands act with a delay, the loop remembers those that are under way and decides on the predicted state
 //! ([`crate::prediction`]). The memory holds levels; so the droop, too, then answers in whole levels, and the prediction knows exactly what is
-//! under way.
+//! under way. An event's end keeps the memory: what was commanded last still acts when the next event begins within the delay.
 
 use crate::droop::Droop;
 use crate::phase::{Phase, PhaseState, Step};
@@ -80,8 +80,15 @@ impl<'t> ControlLoop<'t> {
         self.state
     }
 
-    /// Advances by one tick (`sampling.watch_s`) with the state measured at it.
+    /// Advances by one tick (`sampling.watch_s`) with the state measured at it, and takes note of the action.
     pub fn step(&mut self, state: State) -> Action {
+        let mut action = self.ask(state);
+        action.participation = self.impose(action.participation);
+        action
+    }
+
+    /// The same for a caller that may command something else: [`ControlLoop::impose`] must be told what, once a tick.
+    pub fn ask(&mut self, state: State) -> Action {
         let Ok(table) = &self.table else {
             self.state.phase = Phase::Fallback;
             return Action {
@@ -97,17 +104,8 @@ impl<'t> ControlLoop<'t> {
         let (next, step) = self.state.step_ahead(table, state, ahead);
         self.state = next;
         let (participation, source) = match step {
-            Step::Level(level) => {
-                let header = table.header();
-                if header.delay_ticks > 0 {
-                    self.history.push(level);
-                }
-                (header.participation(level), Source::Table)
-            }
-            Step::Outside => {
-                let droop = self.droop.participation(state);
-                (self.impose(droop), Source::DroopOutside)
-            }
+            Step::Level(level) => (table.header().participation(level), Source::Table),
+            Step::Outside => (self.droop.participation(state), Source::DroopOutside),
         };
         Action {
             participation,
@@ -116,8 +114,8 @@ impl<'t> ControlLoop<'t> {
         }
     }
 
-    /// Takes note of a participation for this tick that was decided elsewhere, and returns what is to be commanded: with a delay the
-    /// nearest level of the table, else the same.
+    /// Takes note of the participation that was decided for this tick, and returns what is to be commanded: with a delay the nearest
+    /// level of the table, else the same. A level's own participation is that level again.
     #[inline(never)]
     pub fn impose(&mut self, participation: Participation) -> Participation {
         let Some(header) = self.delayed() else {
@@ -166,9 +164,14 @@ impl<'t> ControlLoop<'t> {
         }
     }
 
-    /// Forgets the event and the commands under way: back to No control.
-    pub fn reset(&mut self) {
+    /// Forgets the event: back to No control. The commands under way are still known.
+    pub const fn end_event(&mut self) {
         self.state = PhaseState::INITIAL;
+    }
+
+    /// Forgets the event and the commands under way, as after a restart: nobody knows them until the delay has passed.
+    pub fn reset(&mut self) {
+        self.end_event();
         self.history = History::NONE;
     }
 }

@@ -65,7 +65,8 @@ pub enum Course {
 enum Stage {
     /// No event, or one that lasts; ticks in a row with f recovered.
     Lasting(u32),
-    Releasing,
+    /// What is not released yet \[ppm\]. Kept here, for where commands act late only whole levels of it are commanded.
+    Releasing(u32),
 }
 
 /// Follows one event after another.
@@ -97,12 +98,11 @@ impl EventWatch {
         self.stage = Stage::Lasting(0);
     }
 
-    /// Before the table is asked: what to do at a tick, `ticks` after the last one, at this frequency \[µHz\]. `last` is the
-    /// participation in force.
-    pub fn course(&mut self, f_uhz: i32, last: Participation, ticks: u16) -> Course {
-        if self.stage != Stage::Releasing {
+    /// Before the table is asked: what to do at a tick, `ticks` after the last one, at this frequency \[µHz\].
+    pub fn course(&mut self, f_uhz: i32, ticks: u16) -> Course {
+        let Stage::Releasing(last) = self.stage else {
             return Course::Follow;
-        }
+        };
         if f_uhz < self.outer.low_uhz {
             self.reset();
             return Course::Anew;
@@ -115,17 +115,25 @@ impl EventWatch {
             0
         };
         let released = rate.saturating_mul(u32::from(ticks));
-        let left = last.ppm().saturating_sub(released);
+        let left = last.saturating_sub(released);
         if left == 0 {
             self.reset();
             return Course::Over;
         }
+        self.stage = Stage::Releasing(left);
         Course::Release(Participation::from_ppm(left))
     }
 
     /// After the table was asked: whether the release begins, now. `responding` says that an event is on; `covered`, that
-    /// a law covers the state.
-    pub fn ends(&mut self, f_uhz: i32, responding: bool, covered: bool, ticks: u16) -> bool {
+    /// a law covers the state; `last` is the participation in force, from which the release starts.
+    pub fn ends(
+        &mut self,
+        f_uhz: i32,
+        responding: bool,
+        covered: bool,
+        last: Participation,
+        ticks: u16,
+    ) -> bool {
         let Stage::Lasting(so_far) = self.stage else {
             return false;
         };
@@ -136,7 +144,7 @@ impl EventWatch {
         };
         let above = responding && !covered && f_uhz > self.outer.high_uhz;
         if above || recovered >= self.recovered_ticks {
-            self.stage = Stage::Releasing;
+            self.stage = Stage::Releasing(last.ppm());
             return true;
         }
         self.stage = Stage::Lasting(recovered);
@@ -154,13 +162,15 @@ mod tests {
         high_uhz: 0,
     };
 
+    const ALL: Participation = Participation::ALL;
+
     fn watch() -> EventWatch {
         EventWatch::new(EventEnd::DEFAULT, OUTER, 100)
     }
 
-    fn releasing() -> EventWatch {
+    fn releasing(last: Participation) -> EventWatch {
         let mut watch = watch();
-        assert!(watch.ends(1, true, false, 1));
+        assert!(watch.ends(1, true, false, last, 1));
         watch
     }
 
@@ -168,41 +178,40 @@ mod tests {
     fn five_minutes_without_a_break_end_an_event() {
         let mut watch = watch();
         for n in 1..3000 {
-            assert!(!watch.ends(-100_000, true, true, 1), "{n}");
+            assert!(!watch.ends(-100_000, true, true, ALL, 1), "{n}");
         }
-        assert!(!watch.ends(-100_001, true, true, 1));
+        assert!(!watch.ends(-100_001, true, true, ALL, 1));
         for n in 1..3000 {
-            assert!(!watch.ends(-100_000, true, true, 1), "{n}");
+            assert!(!watch.ends(-100_000, true, true, ALL, 1), "{n}");
         }
-        assert!(watch.ends(-100_000, true, true, 1));
+        assert!(watch.ends(-100_000, true, true, ALL, 1));
         // Without an event there is nothing to end.
         let mut quiet = self::watch();
-        assert!((0..10_000).all(|_| !quiet.ends(1_000, false, true, 1)));
+        assert!((0..10_000).all(|_| !quiet.ends(1_000, false, true, ALL, 1)));
     }
 
     #[test]
     fn a_release_takes_ten_minutes_and_waits_for_the_frequency() {
-        let mut watch = releasing();
-        let all = Participation::ALL;
+        let mut watch = releasing(ALL);
         // 1e6 ppm over 6000 ticks, rounded up.
         let at = |ppm| Course::Release(Participation::from_ppm(ppm));
-        assert_eq!(watch.course(-50_000, all, 1), at(1_000_000 - 167));
-        assert_eq!(watch.course(-50_000, all, 3), at(1_000_000 - 501));
-        assert_eq!(watch.course(-100_001, all, 1), at(1_000_000));
-        assert_eq!(watch.course(1, all, 1), at(1_000_000 - 1_670));
-        let last = Participation::from_ppm(167);
-        assert_eq!(watch.course(-50_000, last, 1), Course::Over);
-        assert_eq!(watch.course(-50_000, last, 1), Course::Follow);
+        assert_eq!(watch.course(-50_000, 1), at(1_000_000 - 167));
+        assert_eq!(watch.course(-50_000, 3), at(1_000_000 - 4 * 167));
+        assert_eq!(watch.course(-100_001, 1), at(1_000_000 - 4 * 167));
+        assert_eq!(watch.course(1, 1), at(1_000_000 - 14 * 167));
+        // 5989 = ⌈1e6 / 167⌉ steps in all.
+        for n in 15..5989 {
+            assert_eq!(watch.course(-50_000, 1), at(1_000_000 - n * 167));
+        }
+        assert_eq!(watch.course(-50_000, 1), Course::Over);
+        assert_eq!(watch.course(-50_000, 1), Course::Follow);
     }
 
     #[test]
     fn below_i1_the_event_begins_anew() {
-        let mut watch = releasing();
-        assert_eq!(watch.course(-300_001, Participation::ALL, 1), Course::Anew);
-        assert_eq!(
-            watch.course(-300_001, Participation::ALL, 1),
-            Course::Follow
-        );
+        let mut watch = releasing(ALL);
+        assert_eq!(watch.course(-300_001, 1), Course::Anew);
+        assert_eq!(watch.course(-300_001, 1), Course::Follow);
     }
 
     #[test]
@@ -212,7 +221,7 @@ mod tests {
             high_uhz: 0,
         };
         let mut watch = EventWatch::new(EventEnd::DEFAULT, narrow, 100);
-        assert!((0..10_000).all(|_| !watch.ends(-50_001, true, true, 1)));
+        assert!((0..10_000).all(|_| !watch.ends(-50_001, true, true, ALL, 1)));
     }
 
     proptest! {
@@ -221,7 +230,7 @@ mod tests {
         fn a_release_is_bounded(f in any::<i32>(), ppm in 0u32..=1_000_000, ticks in 0u16..10) {
             let last = Participation::from_ppm(ppm);
             let bound = 1_670 * u32::from(ticks);
-            match releasing().course(f, last, ticks) {
+            match releasing(last).course(f, ticks) {
                 Course::Release(now) => {
                     prop_assert!(now <= last && last.ppm() - now.ppm() <= bound);
                 }

@@ -169,7 +169,7 @@ fn the_prediction_lies_between_header_and_blocks() {
     assert_eq!(image[172..180], [0, 0, 0, 1, 0, 0, 0x80, 0xFF]);
     assert_eq!(image[244..248], [7, 0, 0, 0]);
     assert_eq!(image[256..260], [0, 0, 1, 0]);
-    assert_eq!(image[268..298], DOMAIN);
+    assert_eq!(image[268..268 + DOMAIN.len()], DOMAIN);
     let table = TableView::parse(&image).unwrap();
     assert_eq!(table.header().delay_ticks, 1);
     assert_eq!(table.lookup(Law::C1, Cell([2, 0, 1, 0])), Some(2));

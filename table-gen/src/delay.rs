@@ -220,15 +220,16 @@ impl Delay {
         (low, high)
     }
 
-    /// What is predicted, with nothing under way, from the estimates of a box.
+    /// What is predicted, with nothing under way, from estimates within `spread` of a box.
     pub fn predicted_box(
         &self,
         low: [f64; STATES],
         high: [f64; STATES],
+        spread: &[f64; STATES],
     ) -> ([f64; STATES], [f64; STATES]) {
         let centre = std::array::from_fn(|d| Interval::point(0.5 * (low[d] + high[d])));
         let radius = std::array::from_fn(|d| 0.5 * (high[d] - low[d]));
-        self.predicted(&centre, &self.flow.phi, &radius, &[0.0; STATES])
+        self.predicted(&centre, &self.flow.phi, &radius, spread)
     }
 
     /// The coefficients to the nearest, and what they stand for.

@@ -10,11 +10,15 @@ use firmware::table::{
     bits_per_entry, seal, write_header,
 };
 use firmware::units::{Band, STATES};
+use table_gen::delay::Delay;
 
 /// Input levels: steps of 5 %.
 const LEVELS: u8 = 21;
 /// Cells of the grid: f in 0.05 Hz, g, l, p in 0.5 GW.
 const COUNT: [u16; STATES] = [24, 8, 6, 6];
+
+/// Offset of the delay in the header.
+const DELAY_AT: usize = 78;
 
 /// Why no table was made.
 #[derive(Debug)]
@@ -121,6 +125,18 @@ pub fn table(stay: bool) -> Result<Vec<u8>, StandInError> {
     image.extend(blocks.into_iter().flatten());
     image.extend([0; CRC_LEN]);
     seal(&mut image).map_err(StandInError::Write)?;
+    Ok(image)
+}
+
+/// The same laws in a table whose commands act late, with the prediction of this delay. Nobody proved what it does.
+///
+/// # Errors
+/// None for a table that the reader accepts and has no delay yet.
+pub fn late(table: &[u8], delay: &Delay) -> Result<Vec<u8>, WriteError> {
+    let mut image = table.to_vec();
+    image[DELAY_AT..DELAY_AT + 2].copy_from_slice(&(delay.ticks as u16).to_le_bytes());
+    image.splice(HEADER_LEN..HEADER_LEN, delay.coefficients.bytes());
+    seal(&mut image)?;
     Ok(image)
 }
 

@@ -5,12 +5,21 @@
     reason = "a test that cannot go on fails"
 )]
 
+use std::collections::VecDeque;
+
 use firmware::fault::Mode;
 use firmware::link::session::{Session, Wires};
 use firmware::link::{Mains, Request, Response, Setup, SourceKind};
+use firmware::phase::{Phase, PhaseState, Step};
+use firmware::prediction::History;
+use firmware::table::TableView;
+use firmware::telemetry::phase_number;
+use firmware::units::State;
+use table_gen::delay::Delay;
 use table_gen::simulation::propagator::Propagator;
+use table_gen::spec::Spec;
 use tests::pil::run::plant;
-use tests::root;
+use tests::{root, stand_in};
 
 const TICK_S: f64 = 0.1;
 const FLEET_GW: f64 = 1.4;
@@ -25,13 +34,27 @@ struct Tick {
     share_ppm: u32,
     mode: Mode,
     phase: u8,
+    state: State,
 }
 
-/// A loss over time \[GW\] against a bidirectional fleet with this table.
+fn shipped(table: &str) -> Vec<u8> {
+    std::fs::read(root().join("firmware/tables").join(table)).unwrap()
+}
+
+/// A loss over time \[GW\] against a bidirectional fleet with this shipped table.
 fn run(table: &str, until_s: f64, loss_gw: impl Fn(f64) -> f64) -> Vec<Tick> {
-    let table = std::fs::read(root().join("firmware/tables").join(table)).unwrap();
+    run_late(&shipped(table), 0, until_s, loss_gw)
+}
+
+/// The same with any table, and a fleet that answers so many ticks late.
+fn run_late(
+    table: &[u8],
+    delay_ticks: usize,
+    until_s: f64,
+    loss_gw: impl Fn(f64) -> f64,
+) -> Vec<Tick> {
     let wires = Wires::default();
-    let mut session = Session::new(&wires, &table);
+    let mut session = Session::new(&wires, table);
     let setup = Setup {
         source: SourceKind::Deviation,
         bidirectional: true,
@@ -43,6 +66,7 @@ fn run(table: &str, until_s: f64, loss_gw: impl Fn(f64) -> f64) -> Vec<Tick> {
     assert_eq!(session.handle(&Request::Start(setup)), Response::Done);
     let grid = Propagator::new(&plant(FLEET_GW), TICK_S);
     let mut x = [0.0_f64; 4];
+    let mut under_way = VecDeque::from(vec![0.0; delay_ticks]);
     (0..(until_s / TICK_S) as u32)
         .map(|n| {
             let s = f64::from(n) * TICK_S;
@@ -61,8 +85,10 @@ fn run(table: &str, until_s: f64, loss_gw: impl Fn(f64) -> f64) -> Vec<Tick> {
                 share_ppm: frame.participation_ppm,
                 mode: Mode::ALL[usize::from(frame.mode)],
                 phase: frame.phase,
+                state: State(frame.state),
             };
-            let share = f64::from(frame.participation_ppm) * 1e-6;
+            under_way.push_back(f64::from(frame.participation_ppm) * 1e-6);
+            let share = under_way.pop_front().unwrap();
             x = grid.step(&x, FLEET_GW * share - loss_gw(s));
             tick
         })
@@ -160,4 +186,69 @@ fn the_next_loss_during_a_release_is_answered() {
         let lowest = second.map(|tick| tick.f_hz).fold(0.0, f64::min);
         assert!(lowest > -0.8, "{table}: {lowest}");
     }
+}
+
+/// The commands that the charger gave are all that is under way, whoever decided them: from them alone follows every decision.
+#[test]
+fn the_next_loss_within_the_delay_is_decided_on_what_is_under_way() {
+    let (mut anew, mut forgetful) = (0, 0);
+    for delay_ticks in [10, 20] {
+        let set = format!(
+            "uncertainty.actuation_delay_s={}",
+            delay_ticks as f64 * TICK_S
+        );
+        let spec = Spec::load("paper-bi", &[set]).unwrap();
+        let delay = Delay::of(&spec).unwrap().unwrap();
+        let bytes = stand_in::late(&shipped("paper-bi.bin"), &delay).unwrap();
+        let table = TableView::parse(&bytes).unwrap();
+        // Every second loss comes while the fleet is released from the first.
+        for (second_s, second_gw) in [(225.0, 1.5), (260.0, 2.0), (300.0, 1.0), (380.0, 2.0)] {
+            let loss = |s: f64| match s {
+                s if s < 200.0 => 2.0,
+                s if s < second_s => 0.0,
+                _ => second_gw,
+            };
+            let ticks = run_late(&bytes, delay_ticks, second_s + 60.0, loss);
+            let (begun, otherwise) = follow(&table, &ticks);
+            println!("{delay_ticks} {second_s} {second_gw}: {begun} {otherwise}");
+            anew += begun;
+            forgetful += otherwise;
+        }
+    }
+    // The case exists, and forgetting what is under way would have decided otherwise.
+    assert!(anew > 0 && forgetful > 0, "{anew} {forgetful}");
+}
+
+/// Holds every decision of a run against the phase machine on what follows from the commands so far. How many events began during a
+/// release, and for how many the decision would have been another had the commands under way been forgotten.
+fn follow(table: &TableView<'_>, ticks: &[Tick]) -> (u32, u32) {
+    let prediction = table.prediction().unwrap();
+    let step_ppm = table.header().input_step_ppm;
+    let (mut history, mut state) = (History::NONE, PhaseState::INITIAL);
+    let (mut anew, mut forgetful) = (0, 0);
+    for pair in ticks.windows(2) {
+        let (before, now) = (&pair[0], &pair[1]);
+        // What droop and release command are whole levels too, or the prediction would not know them.
+        assert_eq!(before.share_ppm % step_ppm, 0, "{before:?}");
+        history.push((before.share_ppm / step_ppm) as u8);
+        if now.mode == Mode::Release {
+            state = PhaseState::INITIAL;
+            continue;
+        }
+        let decided = |history: &History| {
+            let ahead = || prediction.predict(now.state, history);
+            state.step_ahead(table, now.state, ahead)
+        };
+        let (next, step) = decided(&history);
+        if before.mode == Mode::Release && next.phase != Phase::NoControl {
+            anew += 1;
+            forgetful += u32::from(decided(&History::NONE).1 != step);
+        }
+        state = next;
+        assert_eq!(now.phase, phase_number(next.phase), "{now:?}");
+        if let Step::Level(level) = step {
+            assert_eq!(now.share_ppm, step_ppm * u32::from(level), "{now:?}");
+        }
+    }
+    (anew, forgetful)
 }

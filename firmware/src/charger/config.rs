@@ -34,7 +34,7 @@ pub struct ChargerConfig {
     pub hold_ticks: u16,
     /// Release of the participation per tick once frequency is lost \[ppm\].
     pub release_ppm: u32,
-    /// Ticks of warm-up; `None` takes [`trust_ticks`].
+    /// Ticks of warm-up; `None` takes [`trust_ticks`], or the table's delay if that is longer.
     pub warm_up_ticks: Option<u16>,
     /// When an event is over, and how long the way back takes.
     pub event_end: EventEnd,

@@ -9,19 +9,26 @@ use std::time::Instant;
 use clap::{Parser, Subcommand};
 use firmware::link::session::{Session, Wires};
 use firmware::link::{Request, Setup, SourceKind};
+use firmware::table::TableView;
+use table_gen::game::Unwatched;
+use table_gen::pipeline;
 use table_gen::replay::trace;
+use table_gen::spec::Spec;
 use tests::costs::{self, CostError};
 use tests::images::{self, Elf, PIL, PRODUCTS};
 use tests::pil::machine::{self, Machine};
 use tests::pil::qemu::Target;
 use tests::pil::run::{Outcome, Pair, closed_loop, recorded};
-use tests::pil::scenario;
+use tests::pil::scenario::{self, Scenario};
 use tests::{root, stand_in};
 
 /// The recorded day, beside the repository.
 const RECORDED: &str = "../shared/data/gb-frequency-2019-08-09.csv";
 /// The table that the images carry.
 const TABLE: &str = "firmware/tables/paper-bi.bin";
+
+/// Most random scenarios with commands that act late.
+const LATE_SCENARIOS_MAX: u64 = 200;
 
 /// The images of Holdfast: built, run in QEMU, measured.
 #[derive(Debug, Parser)]
@@ -162,30 +169,49 @@ fn processor_in_the_loop(
 ) -> Result<(), AnyError> {
     let table = table_bytes(table)?;
     let image = images::build(PIL, machine.target)?;
+    in_lock_step(machine, &image, &table, |pair| {
+        runs(pair, (scenarios, ticks), 0)?;
+        replay(pair)
+    })?;
+    let late = late_table()?;
+    let delay_ticks = TableView::parse(&late)
+        .map_err(|error| format!("{error:?}"))?
+        .header()
+        .delay_ticks;
+    println!(
+        "a table of {} bytes whose commands act {delay_ticks} ticks late:",
+        late.len()
+    );
+    in_lock_step(machine, &image, &late, |pair| {
+        let scenarios = scenarios.min(LATE_SCENARIOS_MAX);
+        runs(pair, (scenarios, ticks), delay_ticks)
+    })
+}
+
+/// The table of the shipped spec whose commands act late, built now.
+fn late_table() -> Result<Vec<u8>, AnyError> {
+    let spec = Spec::load("gb-bi-delay", &[])?;
+    Ok(pipeline::table_bytes(&spec, None, &|_| {
+        Box::new(Unwatched)
+    })?)
+}
+
+/// Host and target with one table, from the start of the emulator to its end.
+fn in_lock_step(
+    machine: Machine,
+    image: &Path,
+    table: &[u8],
+    play: impl FnOnce(&mut Pair<'_, '_>) -> Result<(), AnyError>,
+) -> Result<(), AnyError> {
     let started = Instant::now();
-    let mut target = Target::start(machine, &image, &table, false)?;
+    let mut target = Target::start(machine, image, table, false)?;
     let wires = Wires::default();
-    let mut host = Session::new(&wires, &table);
+    let mut host = Session::new(&wires, table);
     if let Some(reason) = host.table_error() {
         return Err(format!("the firmware's reader rejects the table: {reason:?}").into());
     }
     let mut pair = Pair::new(&mut host, &mut target)?;
-    for bidirectional in [false, true] {
-        let outcome = closed_loop(&mut pair, &scenario::event(bidirectional))?;
-        tell("the paper's event", &outcome);
-    }
-    let outcome = closed_loop(&mut pair, &scenario::recovery())?;
-    tell("the same to its end", &outcome);
-    replay(&mut pair)?;
-    let mut sum: Option<Outcome> = None;
-    for n in 0..scenarios {
-        let outcome = closed_loop(&mut pair, &scenario::random(n, ticks))
-            .map_err(|error| format!("random scenario {n}: {error}"))?;
-        sum.get_or_insert(outcome).add(&outcome);
-    }
-    if let Some(sum) = sum {
-        tell(&format!("{scenarios} random scenarios"), &sum);
-    }
+    play(&mut pair)?;
     let agreed = pair.agreed;
     target.ask(&Request::Stop)?;
     println!(
@@ -193,6 +219,34 @@ fn processor_in_the_loop(
         started.elapsed().as_secs_f64(),
         machine.name
     );
+    Ok(())
+}
+
+/// The events and so many random scenarios of so many ticks, on a grid whose fleet answers late.
+fn runs(
+    pair: &mut Pair<'_, '_>,
+    (scenarios, ticks): (u64, u32),
+    delay_ticks: u16,
+) -> Result<(), AnyError> {
+    let late = |scenario| Scenario {
+        delay_ticks,
+        ..scenario
+    };
+    for bidirectional in [false, true] {
+        let outcome = closed_loop(pair, &late(scenario::event(bidirectional)))?;
+        tell("the paper's event", &outcome);
+    }
+    let outcome = closed_loop(pair, &late(scenario::recovery()))?;
+    tell("the same to its end", &outcome);
+    let mut sum: Option<Outcome> = None;
+    for n in 0..scenarios {
+        let outcome = closed_loop(pair, &late(scenario::random(n, ticks)))
+            .map_err(|error| format!("random scenario {n}: {error}"))?;
+        sum.get_or_insert(outcome).add(&outcome);
+    }
+    if let Some(sum) = sum {
+        tell(&format!("{scenarios} random scenarios"), &sum);
+    }
     Ok(())
 }
 

@@ -1,5 +1,7 @@
 //! Host and target in lock step: the same requests, answers compared to the bit, the target's answer closing the loop.
 
+use std::collections::VecDeque;
+
 use firmware::fault::Mode;
 use firmware::link::session::Session;
 use firmware::link::{Request, Response, Setup};
@@ -136,6 +138,7 @@ pub fn closed_loop(pair: &mut Pair<'_, '_>, scenario: &Scenario) -> Result<Outco
     let mut mains = MainsModel::new(scenario.setup.source);
     let mut outcome = Outcome::NONE;
     let (mut x, mut now_ms) = ([0.0; 4], 0u32);
+    let mut under_way = VecDeque::from(vec![0.0; usize::from(scenario.delay_ticks)]);
     for tick in 0..scenario.ticks {
         let noise = if scenario.noise_hz > 0.0 {
             random.random_range(-scenario.noise_hz..=scenario.noise_hz)
@@ -157,7 +160,8 @@ pub fn closed_loop(pair: &mut Pair<'_, '_>, scenario: &Scenario) -> Result<Outco
             now_ms,
             mains: seen,
         })?;
-        let share = outcome.note(&response);
+        under_way.push_back(outcome.note(&response));
+        let share = under_way.pop_front().unwrap_or(0.0);
         now_ms = now_ms.wrapping_add(TICK_MS);
         // Several losses may come and go; the last one that has begun counts.
         let loss = scenario

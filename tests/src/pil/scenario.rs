@@ -26,6 +26,8 @@ pub struct Scenario {
     pub setup: Setup,
     /// Ticks.
     pub ticks: u32,
+    /// Ticks after which a command acts on the grid.
+    pub delay_ticks: u16,
     /// Lost power \[GW\], from the tick.
     pub losses: Vec<(u32, f64)>,
     /// Measurement noise \[Hz\].
@@ -48,6 +50,7 @@ pub fn event(bidirectional: bool) -> Scenario {
             brown_out: false,
         },
         ticks: 1200,
+        delay_ticks: 0,
         losses: vec![(0, 2.0)],
         noise_hz: 0.0,
         faults: Vec::new(),
@@ -105,6 +108,7 @@ pub fn random(n: u64, ticks: u32) -> Scenario {
             brown_out: random.random_bool(0.3),
         },
         ticks,
+        delay_ticks: 0,
         losses,
         noise_hz: [0.0, 0.001, 0.01][random.random_range(0..3)],
         faults,
