@@ -385,7 +385,7 @@ fn worst_lookup(target: &mut Target, table: &[u8]) -> Result<u32, CostError> {
                     (u64::from(n) * stride % u64::from(cells)) as u32,
                 );
                 let low = grid.bounds(cell)?.map(|(low, _)| low);
-                Some((reader.encoding().visits(cell), low))
+                Some((reader.visits(cell), low))
             })
             .collect();
         dearest.sort_by_key(|(visits, _)| std::cmp::Reverse(*visits));

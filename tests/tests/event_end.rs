@@ -149,7 +149,7 @@ fn an_event_whose_loss_nobody_replaces_does_not_end() {
 /// More than half of the loss is replaced, and what Fixed still holds brings f above 49.9 Hz, or above I1.
 #[test]
 fn a_release_that_comes_too_early_stands_still_above_i1() {
-    for rest_gw in [0.7, 0.8, 0.9] {
+    for rest_gw in [0.8, 0.85, 0.9] {
         let loss = |s: f64| if s < 200.0 { 2.0 } else { rest_gw };
         let ticks = run("paper-bi.bin", 3600.0, loss);
         let after = &ticks[first_release(&ticks)..];
