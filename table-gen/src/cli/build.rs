@@ -3,14 +3,14 @@
 use std::path::PathBuf;
 
 use clap::ValueEnum;
-use firmware::table::{InputsKind, Law, TableView};
+use firmware::table::{DENSE_HEADER_LEN, Header, InputsKind, Law, TableView, bits_per_entry};
 use serde::Serialize;
 
 use super::files::write_all;
 use super::synth::SynthReport;
 use super::{Failure, OutputArgs, SpecArgs, output, progress, simulate, verify};
 use crate::budget;
-use crate::compress::{LawReport, Options};
+use crate::compress::{LawReport, Options, VISITS_GOAL};
 use crate::pipeline::{self, Encoding};
 use crate::report::{self, Findings};
 use crate::simulation::closed_loop::{self, Estimator};
@@ -69,6 +69,8 @@ struct EncodingReport {
     inputs_bytes: u32,
     entries: u32,
     worst_visits: u16,
+    /// What a dense array over the whole grid would take.
+    dense_bytes: u64,
     #[serde(skip_serializing_if = "Option::is_none")]
     domain_cells: Option<usize>,
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -175,12 +177,19 @@ fn encodings(table: &TableView<'_>, reports: &[(Law, LawReport)]) -> Vec<Encodin
                 inputs_bytes: entry.inputs_len,
                 entries: view.encoding().entries(),
                 worst_visits: entry.worst_visits,
+                dense_bytes: dense_bytes(table.header()),
                 domain_cells: report.map(|r| r.domain_cells),
                 worst_steps: report.map(|r| r.steps),
                 worst_steps_minimal: report.map(|r| r.steps_minimal),
             })
         })
         .collect()
+}
+
+/// Bytes of a dense law over the whole grid.
+fn dense_bytes(header: &Header) -> u64 {
+    let bits = u64::from(header.grid.cells()) * u64::from(bits_per_entry(header.levels));
+    DENSE_HEADER_LEN as u64 + bits.div_ceil(8)
 }
 
 fn print_encodings(report: &BuildReport<'_>) {
@@ -216,6 +225,20 @@ fn print_encodings(report: &BuildReport<'_>) {
         "table: {} bytes",
         output::grouped(report.table_bytes)
     ));
+    let dense: u64 = report.encodings.iter().map(|row| row.dense_bytes).sum();
+    let visits = report.encodings.iter().map(|row| row.worst_visits).max();
+    let is_tree = report.encodings.iter().any(|row| row.encoding == "tree");
+    if let (Some(visits), true) = (visits, is_tree) {
+        let within = if visits <= VISITS_GOAL {
+            "within"
+        } else {
+            "past"
+        };
+        output::line(format_args!(
+            "why trees: dense arrays over the grid would take {} bytes; a lookup visits at most {visits} nodes, {within} the {VISITS_GOAL} aimed for",
+            output::grouped(dense as usize)
+        ));
+    }
 }
 
 /// Lower-case hexadecimal.
