@@ -138,6 +138,8 @@ fn draw(outcomes: &[Outcome], text: &mut String) -> Result<(), Box<dyn std::erro
     };
     let (fewest, most) = ends(&|point| point.0, (100.0, 1000.0));
     let (soonest, latest) = ends(&|point| point.1, (0.0, 60.0));
+    // Whole decades: only those carry a label.
+    let decade = |power: f64| 10f64.powf(power);
     let room = (0.1 * (latest - soonest)).max(0.5);
     let root = SVGBackend::with_string(text, SIZE).into_drawing_area();
     root.fill(&WHITE)?;
@@ -146,11 +148,12 @@ fn draw(outcomes: &[Outcome], text: &mut String) -> Result<(), Box<dyn std::erro
         .x_label_area_size(44)
         .y_label_area_size(56)
         .build_cartesian_2d(
-            (fewest / 2.0..most * 2.0).log_scale(),
+            (decade(fewest.log10().floor())..decade((most * 1.01).log10().ceil())).log_scale(),
             soonest - room..latest + room,
         )?;
     chart
         .configure_mesh()
+        .max_light_lines(1)
         .x_desc("table [bytes]; filled: nothing is smaller, faster and bears more")
         .y_desc("worst time to I2 [s]")
         .x_label_formatter(&|bytes| format!("{bytes:.0}"))
