@@ -29,7 +29,7 @@ use crate::frequency::filter::Filter;
 use crate::frequency::gate::Gate;
 use crate::observer::{Observer, ObserverConfig};
 use crate::phase::Phase;
-use crate::table::{TableError, TableView};
+use crate::table::{TableError, TableView, field};
 use crate::units::{Participation, State};
 use crate::wide::divide;
 use report::log_changes;
@@ -119,7 +119,7 @@ impl<'t, S: FrequencySource, D: Dispatch, W: Watchdog> Charger<'t, S, D, W> {
         // A chain that is too fast for the tick makes the table as useless as a broken one.
         let unusable = observer.is_none() && table.is_ok();
         if unusable {
-            table = Err(TableError::BadField { offset: 108 });
+            table = Err(TableError::bad_field(&field::GOVERNOR_TIME));
         }
         let warm_up_ticks = config.warm_up_ticks.unwrap_or_else(|| {
             plant.map_or(0, |plant| trust_ticks(&plant, tick_ms).max(delay_ticks))

@@ -1,16 +1,13 @@
 //! The table in its flash region.
 
-use crate::table::HEADER_LEN;
-
-/// Offset of the total length in the header.
-const LENGTH_AT: usize = 8;
+use crate::table::{HEADER_LEN, field};
 
 /// The table's image at the start of a flash region, which may be larger than the table and may have been erased or
 /// written half. The header's length delimits it; a length that cannot be gives the whole region back, for the parser to
 /// reject with the reason.
 pub fn image(region: &[u8]) -> &[u8] {
     let length = region
-        .get(LENGTH_AT..)
+        .get(field::LENGTH)
         .and_then(<[u8]>::first_chunk::<4>)
         .map_or(0, |bytes| u32::from_le_bytes(*bytes) as usize);
     if length < HEADER_LEN {
@@ -41,9 +38,9 @@ mod tests {
     #[test]
     fn the_header_delimits_the_image() {
         let mut region = [0xFF; 1024];
-        region[LENGTH_AT..LENGTH_AT + 4].copy_from_slice(&300u32.to_le_bytes());
+        region[field::LENGTH].copy_from_slice(&300u32.to_le_bytes());
         assert_eq!(image(&region).len(), 300);
-        region[LENGTH_AT..LENGTH_AT + 4].copy_from_slice(&1025u32.to_le_bytes());
+        region[field::LENGTH].copy_from_slice(&1025u32.to_le_bytes());
         assert_eq!(image(&region).len(), 1024);
     }
 }

@@ -158,4 +158,41 @@ impl Grid {
         }
         Some(index)
     }
+
+    /// The cell at a position of the dense array: the inverse of [`Grid::index`]. `None` past the last.
+    pub const fn cell(&self, index: u32) -> Option<Cell> {
+        if index >= self.cells() {
+            return None;
+        }
+        let mut rest = index;
+        let mut cell = [0; STATES];
+        let mut axis = 0;
+        while axis < STATES {
+            // No count is zero, and a remainder is below the count, which fits 16 bits.
+            let count = self.count[axis] as u32;
+            cell[axis] = (rest % count) as u16;
+            rest /= count;
+            axis += 1;
+        }
+        Some(Cell(cell))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    proptest! {
+        /// 300 · 40 · 7 · 2 cells: every position is the index of its cell, and the last is the last.
+        #[test]
+        fn a_cell_is_the_inverse_of_its_index(index in 0u32..200_000) {
+            let grid = Grid::new([-5, 0, 7, 0], [3, 1, 9, 2], [300, 40, 7, 2]).unwrap();
+            let cell = grid.cell(index);
+            prop_assert_eq!(cell.is_some(), index < grid.cells());
+            if let Some(cell) = cell {
+                prop_assert_eq!(grid.index(cell), Some(index));
+            }
+        }
+    }
 }

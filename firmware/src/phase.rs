@@ -17,21 +17,51 @@
 use crate::table::{Law, TableView};
 use crate::units::State;
 
-/// The law in force.
+/// The law in force. Telemetry carries its number.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+#[repr(u8)]
 pub enum Phase {
     /// Not below I1 yet: no charger responds.
-    NoControl,
+    NoControl = 0,
     /// The law that reaches I1.
-    C1,
+    C1 = 1,
     /// The law that reaches I2.
-    C2,
+    C2 = 2,
     /// Inside I2: the last participation is held.
-    Fixed,
+    Fixed = 3,
     /// The law that keeps f in I2 for ever.
-    Hold,
+    Hold = 4,
     /// No law has an entry for the state: the baseline droop.
-    Fallback,
+    Fallback = 5,
+}
+
+impl Phase {
+    /// All phases in the order of their numbers.
+    pub const ALL: [Self; 6] = [
+        Self::NoControl,
+        Self::C1,
+        Self::C2,
+        Self::Fixed,
+        Self::Hold,
+        Self::Fallback,
+    ];
+
+    /// The phase's number, as telemetry and the link carry it.
+    pub const fn number(self) -> u8 {
+        self as u8
+    }
+
+    /// The phase's name, as people and JSON read it.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::NoControl => "no-control",
+            Self::C1 => Law::C1.name(),
+            Self::C2 => Law::C2.name(),
+            Self::Fixed => "fixed",
+            Self::Hold => "hold",
+            Self::Fallback => "fallback",
+        }
+    }
 }
 
 /// What a tick decided.
@@ -68,8 +98,9 @@ impl PhaseState {
         self.step_ahead(table, state, || state)
     }
 
-    /// The same where commands act with a delay: No control watches the `measured` state; every other phase and every decision go by the
-    /// state `ahead`, in which the command begins to act ([`crate::prediction`]). `ahead` is called only if the tick needs it.
+    /// The same where commands act with a delay. No control watches the `measured` state. Every other
+    /// phase and every decision go by the state `ahead`, in which the command begins to act
+    /// ([`crate::prediction`]). `ahead` is called only if the tick needs it.
     #[must_use]
     pub fn step_ahead(
         self,

@@ -8,7 +8,6 @@ use serde::{Deserialize, Serialize};
 
 use crate::charger::Report;
 use crate::dispatch::SetPoint;
-use crate::phase::Phase;
 use crate::table::{CRC_LEN, TableView, checksum};
 use crate::units::STATES;
 
@@ -67,7 +66,7 @@ pub struct Frame {
     pub now_ms: u32,
     /// Number of the [`crate::fault::Mode`].
     pub mode: u8,
-    /// 0 No control, 1 C1, 2 C2, 3 Fixed, 4 Hold, 5 fallback.
+    /// Number of the [`crate::phase::Phase`].
     pub phase: u8,
     /// State estimate f, g, l, p \[µHz, kW\].
     pub state: [i32; STATES],
@@ -83,18 +82,6 @@ pub struct Frame {
     pub table: Option<TableId>,
 }
 
-/// Number of a phase on the line.
-pub const fn phase_number(phase: Phase) -> u8 {
-    match phase {
-        Phase::NoControl => 0,
-        Phase::C1 => 1,
-        Phase::C2 => 2,
-        Phase::Fixed => 3,
-        Phase::Hold => 4,
-        Phase::Fallback => 5,
-    }
-}
-
 impl Frame {
     /// The frame of a report.
     pub fn new(report: &Report, table: Option<TableId>) -> Self {
@@ -103,7 +90,7 @@ impl Frame {
             sequence: report.sequence,
             now_ms: report.now_ms,
             mode: report.mode as u8,
-            phase: phase_number(report.phase),
+            phase: report.phase.number(),
             state: report.state.0,
             loss_kw: report.loss_kw,
             participation_ppm: report.participation.ppm(),

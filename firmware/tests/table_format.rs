@@ -10,19 +10,20 @@ use firmware::control_loop::{ControlLoop, Source};
 use firmware::droop::Droop;
 use firmware::grid::{Cell, Grid};
 use firmware::phase::Phase;
-use firmware::prediction::History;
+use firmware::prediction::{History, prediction_len};
+use firmware::table::field::{Field, entry};
 use firmware::table::*;
 use firmware::units::{Band, State};
 use proptest::prelude::*;
 
-/// A tree over 4 x 3 x 2 x 2 cells: f below 2 gives level 1; else g below 1 gives level 2, else the law.
+/// A tree over 4 x 3 x 2 x 2 cells: f below 2 gives level 1; else g below 1 gives level 2, else the piece.
 const TREE: [u8; 18] = [
-    0x01, // one affine law
+    0x01, // one affine piece
     0x00, 0x04, 0x00, 0x00, 0x00, 0x00, 0x00,
     0x00, // f counts 1024 to the cell: one level a cell
     0x00, 0xFC, 0xFF, 0xFF, // constant -1024: level f - 1
     0x10, 0x01, // f, delta 2; left leaf 1, right node follows
-    0x0D, 0x42, 0x20, // g, delta 1; leaves 2 and law 0
+    0x0D, 0x42, 0x20, // g, delta 1; leaves 2 and piece 0
 ];
 /// Membership: p below 1 is inside if f + g >= 1, all else by the hull (g <= 1).
 const DOMAIN: [u8; 30] = [
@@ -31,6 +32,10 @@ const DOMAIN: [u8; 30] = [
     0x01, 0x00, 0x01, 0x00, 0x00, 0x00, 0x00, 0x00, 0xFF, 0xFF, 0xFF, 0xFF, // f + g - 1 >= 0
     0x0F, 0x43, 0x3F, // p, delta 1; leaves: half-space 1, hull
 ];
+
+/// Where the tree and the dense law begin in [`image`].
+const TREE_AT: usize = HEADER_LEN + DOMAIN.len();
+const DENSE_AT: usize = TREE_AT + TREE.len();
 
 fn header() -> Header {
     Header {
@@ -138,8 +143,8 @@ fn header_bytes_are_as_documented() {
     expected.laws = table.header().laws;
     assert_eq!(*table.header(), expected);
     assert_eq!(
-        write_header(table.header())[12..],
-        image[12..HEADER_LEN],
+        write_header(table.header())[field::SPEC_HASH.start..],
+        image[field::SPEC_HASH.start..HEADER_LEN],
         "what was read is written again"
     );
 }
@@ -154,7 +159,7 @@ fn delayed() -> Vec<u8> {
     words[18] = 7;
     words[21] = 256 << 8;
     let mut image = image();
-    image[78] = 1;
+    image[field::DELAY.start] = 1;
     let part = words.iter().flat_map(|word| word.to_le_bytes());
     image.splice(HEADER_LEN..HEADER_LEN, part);
     seal(&mut image).unwrap();
@@ -164,12 +169,13 @@ fn delayed() -> Vec<u8> {
 #[test]
 fn the_prediction_lies_between_header_and_blocks() {
     let image = delayed();
-    assert_eq!(image[76..80], [15, 0, 1, 0]);
+    assert_eq!(image[field::DELAY], [1, 0]);
     // Φ_ff = 1 and Φ_fg = -1/2 in 24 bits, W_l, G_1 on g in 8 bits.
-    assert_eq!(image[172..180], [0, 0, 0, 1, 0, 0, 0x80, 0xFF]);
-    assert_eq!(image[244..248], [7, 0, 0, 0]);
-    assert_eq!(image[256..260], [0, 0, 1, 0]);
-    assert_eq!(image[268..268 + DOMAIN.len()], DOMAIN);
+    let (part, blocks) = image[HEADER_LEN..].split_at(prediction_len(1));
+    assert_eq!(part[..8], [0, 0, 0, 1, 0, 0, 0x80, 0xFF]);
+    assert_eq!(part[72..76], [7, 0, 0, 0]);
+    assert_eq!(part[84..88], [0, 0, 1, 0]);
+    assert_eq!(blocks[..DOMAIN.len()], DOMAIN);
     let table = TableView::parse(&image).unwrap();
     assert_eq!(table.header().delay_ticks, 1);
     assert_eq!(table.lookup(Law::C1, Cell([2, 0, 1, 0])), Some(2));
@@ -181,7 +187,7 @@ fn the_prediction_lies_between_header_and_blocks() {
     assert!(TableView::parse(&image[..]).is_ok());
     // Without the delay the same bytes are no table.
     let mut wrong = image.clone();
-    wrong[78] = 0;
+    wrong[field::DELAY.start] = 0;
     seal(&mut wrong).unwrap();
     assert!(TableView::parse(&wrong).is_err());
     assert!(
@@ -229,7 +235,7 @@ fn tree_and_domain_answer_as_drawn() {
     assert_eq!(c1(0, 0, 0, 0), None, "f + g = 0 lies outside");
     assert_eq!(c1(1, 0, 0, 0), Some(1));
     assert_eq!(c1(2, 0, 1, 0), Some(2));
-    assert_eq!(c1(3, 1, 0, 0), Some(2), "law: f - 1");
+    assert_eq!(c1(3, 1, 0, 0), Some(2), "piece: f - 1");
     assert_eq!(
         c1(3, 2, 0, 0),
         Some(2),
@@ -278,31 +284,37 @@ fn the_frame_names_what_was_found_and_what_is_supported() {
         error(&image[..100]),
         TableError::TooShort {
             found: 100,
-            needed: 176
+            needed: (HEADER_LEN + CRC_LEN) as u32
         }
     );
-    let with = |at: usize, bytes: &[u8]| {
+    let with = |field: Field, bytes: &[u8]| {
         let mut image = image.clone();
-        image[at..at + bytes.len()].copy_from_slice(bytes);
+        image[field].copy_from_slice(bytes);
         error(&image)
     };
-    assert_eq!(with(0, b"ELF!"), TableError::BadMagic { found: *b"ELF!" });
-    assert_eq!(with(4, &[0xFE, 0xFF]), TableError::WrongEndianness);
     assert_eq!(
-        with(4, &[1, 2]),
+        with(field::MAGIC, b"ELF!"),
+        TableError::BadMagic { found: *b"ELF!" }
+    );
+    assert_eq!(
+        with(field::BYTE_ORDER, &[0xFE, 0xFF]),
+        TableError::WrongEndianness
+    );
+    assert_eq!(
+        with(field::BYTE_ORDER, &[1, 2]),
         TableError::BadByteOrderMark { found: 0x0201 }
     );
     let version = TableError::UnsupportedVersion {
         found: 7,
         supported: FORMAT_VERSION,
     };
-    assert_eq!(with(6, &[7, 0]), version);
+    assert_eq!(with(field::VERSION, &[7, 0]), version);
     let length = TableError::WrongLength {
         found: 241,
         stated: 242,
     };
-    assert_eq!(with(8, &[242]), length);
-    assert!(matches!(with(200, &[9]), TableError::BadCrc { .. }));
+    assert_eq!(with(field::LENGTH, &[242, 0, 0, 0]), length);
+    assert!(matches!(with(200..201, &[9]), TableError::BadCrc { .. }));
     let foreign = TableView::parse_for_spec(&image, [0; SPEC_HASH_LEN]).unwrap_err();
     assert_eq!(
         foreign,
@@ -320,30 +332,37 @@ fn the_frame_names_what_was_found_and_what_is_supported() {
 
 #[test]
 fn header_fields_out_of_range_are_named_by_their_offset() {
-    let cases: &[(usize, &[u8], u16)] = &[
-        (72, &[0], 72),
-        (72, &[33], 72),
-        (68, &[0xFF, 0xFF, 0xFF, 0xFF], 68),
-        (73, &[2], 73),
-        (74, &[0, 0], 74),
-        (76, &[0, 0], 76),
-        (78, &[1, 0], 78),
-        (78, &[65, 0], 78),
-        (84, &[0, 0, 0, 0x80], 80),
-        (92, &[1, 0, 0, 0], 88),
-        (100, &[0, 0, 0, 0], 100),
-        (108, &[0, 0, 0, 0], 108),
-        (112, &[0, 0, 0, 0], 112),
-        (120, &[0, 0, 0, 0], 120),
-        (128, &[0, 0, 0, 0], 128),
-        (150, &[1], 148),
+    let cases: &[(Field, &[u8])] = &[
+        (field::LEVELS, &[0]),
+        (field::LEVELS, &[33]),
+        (field::INPUT_STEP, &[0xFF; 4]),
+        (field::FLAGS, &[2]),
+        (field::TICK, &[0, 0]),
+        (field::PERIOD, &[0, 0]),
+        // A prediction part that the image does not have, and more ticks than the device remembers.
+        (field::DELAY, &[1, 0]),
+        (field::DELAY, &[65, 0]),
+        // High below low; I2 above I1.
+        (field::OUTER, &[0, 0, 0, 0, 0, 0, 0, 0x80]),
+        (field::INNER, &[0, 0, 0, 0, 1, 0, 0, 0]),
+        (field::DROOP_FULL, &[0; 4]),
+        (field::GOVERNOR_TIME, &[0; 4]),
+        (field::TURBINE_TIME, &[0; 4]),
+        (field::LAG_TIME, &[0; 4]),
+        (field::INERTIA, &[0; 4]),
     ];
-    for (at, bytes, offset) in cases {
-        let found = error(&patched(*at, bytes));
-        assert_eq!(found, TableError::BadField { offset: *offset }, "at {at}");
+    for (field, bytes) in cases {
+        let offset = field.start as u16;
+        let found = error(&patched(field.start, bytes));
+        assert_eq!(found, TableError::BadField { offset });
     }
+    // An absent law that has visits.
+    let c2 = field::DIRECTORY.start + DIRECTORY_ENTRY_LEN;
+    let offset = c2 as u16;
+    let found = error(&patched(c2 + field::entry::WORST_VISITS.start, &[1]));
+    assert_eq!(found, TableError::BadField { offset });
     assert!(matches!(
-        error(&patched(44, &[0; 4])),
+        error(&patched(field::WIDTH.start, &[0; 4])),
         TableError::BadGrid(_)
     ));
 }
@@ -354,55 +373,91 @@ fn blocks_are_refused_for_their_own_reasons() {
         law: Law::C1,
         reason,
     };
+    let c1 = field::DIRECTORY.start;
     let cases: &[(&str, usize, &[u8], BlockError)] = &[
         (
             "longer than the image",
-            140,
+            c1 + entry::DOMAIN_LEN.start,
             &[0xFF, 0xFF],
             BlockError::OutOfImage,
         ),
         (
             "domain kind",
-            136,
+            c1 + entry::DOMAIN_KIND.start,
             &[9],
             BlockError::UnknownEncoding { found: 9 },
         ),
         (
             "inputs kind",
-            137,
+            c1 + entry::INPUTS_KIND.start,
             &[9],
             BlockError::UnknownEncoding { found: 9 },
         ),
-        ("bytes without a domain", 136, &[0], BlockError::BadShape),
-        ("too many half-spaces", 172, &[57], BlockError::BadShape),
-        ("hull larger than the list", 173, &[3], BlockError::BadShape),
-        ("too many look-aheads", 174, &[5], BlockError::BadShape),
+        (
+            "bytes without a domain",
+            c1 + entry::DOMAIN_KIND.start,
+            &[0],
+            BlockError::BadShape,
+        ),
+        (
+            "too many half-spaces",
+            HEADER_LEN,
+            &[57],
+            BlockError::BadShape,
+        ),
+        (
+            "hull larger than the list",
+            HEADER_LEN + 1,
+            &[3],
+            BlockError::BadShape,
+        ),
+        (
+            "too many look-aheads",
+            HEADER_LEN + 2,
+            &[5],
+            BlockError::BadShape,
+        ),
         (
             "half-space that overflows",
-            187,
+            HEADER_LEN + 15,
             &[0xFF, 0x7F, 0, 0, 0, 0, 0, 0, 0xFF, 0xFF, 0xFF, 0x7F],
             BlockError::Overflow,
         ),
         (
             "half-space that does not exist",
-            200,
+            HEADER_LEN + 28,
             &[0x44],
             BlockError::BadLevel,
         ),
-        ("too many laws", 202, &[32], BlockError::BadShape),
+        ("too many pieces", TREE_AT, &[32], BlockError::BadShape),
         (
-            "law that overflows",
-            211,
+            "piece that overflows",
+            TREE_AT + 9,
             &[0xFF, 0xFF, 0xFF, 0x7F],
             BlockError::Overflow,
         ),
-        ("level that does not exist", 216, &[4], BlockError::BadLevel),
-        ("law that does not exist", 219, &[33], BlockError::BadLevel),
-        ("delta 0", 215, &[0], BlockError::BadNode),
-        ("left leaf past 63", 218, &[0x80], BlockError::BadNode),
+        (
+            "level that does not exist",
+            TREE_AT + 14,
+            &[4],
+            BlockError::BadLevel,
+        ),
+        (
+            "piece that does not exist",
+            TREE_AT + 17,
+            &[33],
+            BlockError::BadLevel,
+        ),
+        ("delta 0", TREE_AT + 13, &[0], BlockError::BadNode),
+        (
+            "left leaf past 63",
+            TREE_AT + 16,
+            &[0x80],
+            BlockError::BadNode,
+        ),
         (
             "fewer visits than needed",
-            138,
+            c1 + entry::WORST_VISITS.start,
             &[3],
             BlockError::TooManyVisits,
         ),
@@ -414,11 +469,18 @@ fn blocks_are_refused_for_their_own_reasons() {
         law: Law::Hold,
         reason,
     };
-    assert_eq!(error(&patched(236, &[0x05])), of_hold(BlockError::BadLevel));
-    assert_eq!(error(&patched(220, &[4])), of_hold(BlockError::BadShape));
+    assert_eq!(
+        error(&patched(DENSE_AT + DENSE_HEADER_LEN, &[0x05])),
+        of_hold(BlockError::BadLevel)
+    );
+    assert_eq!(
+        error(&patched(DENSE_AT, &[4])),
+        of_hold(BlockError::BadShape)
+    );
+    let hold = c1 + 2 * DIRECTORY_ENTRY_LEN;
     // A directory that leaves bytes over.
     assert_eq!(
-        error(&patched(168, &[16])),
+        error(&patched(hold + entry::INPUTS_LEN.start, &[16])),
         of_hold(BlockError::BadShape),
         "a dense block cut short"
     );
@@ -568,7 +630,7 @@ fn trees_that_are_no_tree_are_refused() {
     assert_eq!(
         block_error(&[1, 0, 0]),
         BlockError::BadShape,
-        "a law cut short"
+        "a piece cut short"
     );
     // 65 nodes in a chain, each with a left leaf; the last has two.
     let mut chain = vec![0];
@@ -657,14 +719,8 @@ proptest! {
 
 fn look_everywhere(table: &TableView<'_>, others: &[[u16; 4]]) {
     let grid = table.header().grid;
-    let count = grid.count();
     for index in 0..grid.cells() {
-        let mut rest = index;
-        let cell = Cell(count.map(|n| {
-            let at = rest % u32::from(n);
-            rest /= u32::from(n);
-            at as u16
-        }));
+        let cell = grid.cell(index).unwrap();
         for law in Law::ALL {
             let level = table.lookup(law, cell);
             assert!(level.is_none_or(|level| level < table.header().levels));

@@ -39,7 +39,7 @@
 //! of ξ, whatever is under way. Targets shrink and containment rises by E' of f, as they do by e without a delay; the guard between the samples
 //! widens the cell by E'.
 
-use firmware::prediction::{LEVEL_FRACTION_BITS, MEASURED_MAX, PHI_FRACTION_BITS};
+use firmware::prediction::{MEASURED_MAX, PHI_FRACTION_BITS, RESPONSE_FRACTION_BITS};
 
 use crate::abstraction::affine::{Drift, Errors};
 use crate::flow::{
@@ -60,7 +60,7 @@ pub struct Coefficients {
     pub phi: [[i32; STATES]; STATES],
     /// Γ_δ (-w₀) \[micro-units\].
     pub loss: [i32; STATES],
-    /// G_1 .. G_n a level, with [`LEVEL_FRACTION_BITS`] fractional bits of a micro-unit.
+    /// G_1 .. G_n a level, with [`RESPONSE_FRACTION_BITS`] fractional bits of a micro-unit.
     pub levels: Vec<[i32; STATES]>,
 }
 
@@ -269,7 +269,7 @@ impl Delay {
             loss: row(loss, 0)?,
             levels: levels
                 .iter()
-                .map(|level| row(*level, LEVEL_FRACTION_BITS))
+                .map(|level| row(*level, RESPONSE_FRACTION_BITS))
                 .collect::<Result<_, _>>()?,
         };
         let exact = Exact {
@@ -347,7 +347,7 @@ fn rounding(
                 up(sum + f64::from(stored.phi[d][j].abs()) / f64::from(1u32 << PHI_FRACTION_BITS));
         }
         for (stored, exact) in stored.levels.iter().zip(&exact.levels) {
-            sum = up(sum + up(off(stored[d], LEVEL_FRACTION_BITS, exact[d]) * most));
+            sum = up(sum + up(off(stored[d], RESPONSE_FRACTION_BITS, exact[d]) * most));
         }
         sum
     })

@@ -13,7 +13,6 @@ use firmware::link::{Mains, Request, Response, Setup, SourceKind};
 use firmware::phase::{Phase, PhaseState, Step};
 use firmware::prediction::History;
 use firmware::table::TableView;
-use firmware::telemetry::phase_number;
 use firmware::units::State;
 use table_gen::delay::Delay;
 use table_gen::simulation::propagator::Propagator;
@@ -245,7 +244,7 @@ fn follow(table: &TableView<'_>, ticks: &[Tick]) -> (u32, u32) {
             forgetful += u32::from(decided(&History::NONE).1 != step);
         }
         state = next;
-        assert_eq!(now.phase, phase_number(next.phase), "{now:?}");
+        assert_eq!(now.phase, next.phase.number(), "{now:?}");
         if let Step::Level(level) = step {
             assert_eq!(now.share_ppm, step_ppm * u32::from(level), "{now:?}");
         }

@@ -3,15 +3,15 @@
 
 use firmware::flash;
 use firmware::grid::Cell;
-use firmware::table::{CRC_LEN, Law, TableView, checksum};
+use firmware::table::{CRC_LEN, Law, TableView, checksum, field};
 use libfuzzer_sys::fuzz_target;
 
 fuzz_target!(|region: &[u8]| {
     let mut image = flash::image(region).to_vec();
     // A right length and CRC let the fuzzer past the first checks.
-    if image.len() > 12 + CRC_LEN {
+    if image.len() > field::LENGTH.end + CRC_LEN {
         let length = image.len() as u32;
-        image[8..12].copy_from_slice(&length.to_le_bytes());
+        image[field::LENGTH].copy_from_slice(&length.to_le_bytes());
         let body = image.len() - CRC_LEN;
         let crc = checksum(&image[..body]);
         image[body..].copy_from_slice(&crc.to_le_bytes());

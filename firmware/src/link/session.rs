@@ -20,7 +20,7 @@ use crate::frequency::ade7953::{self, Ade7953, BusError, Registers};
 use crate::frequency::zero_crossing::ZeroCrossing;
 use crate::frequency::{FrequencyError, FrequencySource, Reading};
 use crate::table::{Law, TableError, TableView};
-use crate::telemetry::{Frame, TableId, phase_number};
+use crate::telemetry::{Frame, TableId};
 use crate::units::{Participation, State};
 
 /// Timer of the zero-crossing source \[Hz\].
@@ -246,7 +246,7 @@ impl<'w> Session<'w> {
                 let action = self.control.step(State(state));
                 Response::Action {
                     participation_ppm: action.participation.ppm(),
-                    phase: phase_number(action.phase),
+                    phase: action.phase.number(),
                     from_table: action.source == Source::Table,
                 }
             }

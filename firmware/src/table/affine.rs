@@ -1,12 +1,13 @@
-//! Integer affine functions of a cell: the laws that a leaf of the tree may name, and the half-spaces of a domain.
+//! Integer affine functions of a cell: pieces that a leaf of an inputs tree names, and half-spaces of
+//! a domain.
 //!
 //! | offset | bytes | field |
 //! |---:|---:|---|
 //! | 0 | 4 × 2 | factor of each cell index, f g l p (i16) |
 //! | 8 | 4 | constant (i32) |
 //!
-//! The value is `constant + Σ factor·index`. It is checked once that no cell of the grid takes any partial sum out of
-//! 32 bits; after that the arithmetic cannot overflow.
+//! The value is `constant + Σ factor·index`. The reader checks once that no cell of the grid takes a
+//! partial sum out of 32 bits; after that the arithmetic cannot overflow.
 
 use super::bytes::array_at;
 use crate::grid::{Cell, Grid};
@@ -15,8 +16,8 @@ use crate::units::{AXIS_F, AXIS_G, AXIS_L, AXIS_P, STATES};
 /// Bytes of a function.
 pub const AFFINE_LEN: usize = 2 * STATES + 4;
 
-/// Fractional bits of a law's value: the level is the value shifted right by these, clamped to the levels.
-pub const LEVEL_FRACTION_BITS: u32 = 10;
+/// Fractional bits of a piece's value: the level is the value shifted right by these, clamped.
+pub const AFFINE_FRACTION_BITS: u32 = 10;
 
 /// An integer affine function of a cell.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -70,7 +71,7 @@ impl AffineFunction {
 
     /// The value as an input level: without its fraction, clamped to `0..levels`.
     pub fn level(&self, cell: Cell, levels: u8) -> u8 {
-        let whole = self.value(cell) >> LEVEL_FRACTION_BITS;
+        let whole = self.value(cell) >> AFFINE_FRACTION_BITS;
         whole.clamp(0, i32::from(levels.saturating_sub(1))) as u8
     }
 }

@@ -10,28 +10,29 @@ mod affine;
 mod bytes;
 mod dense;
 mod domain;
+pub mod field;
 mod header;
+mod header_bytes;
 mod law;
 mod look_ahead;
 mod tree;
 mod tree_node;
-mod write;
 
-pub use affine::{AFFINE_LEN, AffineFunction, LEVEL_FRACTION_BITS};
+pub use affine::{AFFINE_FRACTION_BITS, AFFINE_LEN, AffineFunction};
 pub use dense::{DENSE_HEADER_LEN, DenseView, bits_per_entry};
 pub use domain::{
     DomainKind, HALF_SPACES_MAX, LEAF_HALF_SPACE, LEAF_HULL, LEAF_INSIDE, LEAF_LOOK_AHEAD,
     LEAF_OUTSIDE, LOOK_AHEADS_MAX,
 };
-pub use header::{
-    BYTE_ORDER_MARK, CRC_LEN, DIRECTORY_ENTRY_LEN, FORMAT_VERSION, HEADER_LEN, Header, LAWS,
-    LEVELS_MAX, Law, LawEntry, MAGIC, PlantParameters, SPEC_HASH_LEN,
+pub use header::{Header, LAWS, LEVELS_MAX, Law, LawEntry, PlantParameters, SPEC_HASH_LEN};
+pub use header_bytes::{
+    BYTE_ORDER_MARK, CRC_LEN, DIRECTORY_ENTRY_LEN, FORMAT_VERSION, HEADER_LEN, MAGIC, WriteError,
+    seal, write_header,
 };
 pub use law::{Encoding, InputsKind, LawView};
 pub use look_ahead::{LOOK_AHEAD_LEN, LOOK_AHEAD_SHIFT_MAX, LOOK_AHEAD_STEPS_MAX, LookAhead};
-pub use tree::{AFFINE_LAWS_MAX, LEAF_AFFINE, TREE_DEPTH_MAX, TreeView};
+pub use tree::{AFFINE_PIECES_MAX, LEAF_AFFINE, TREE_DEPTH_MAX, TreeView};
 pub use tree_node::{Children, LEAF_VALUES, NODE_LEN_MAX, Node, SKIP_MAX};
-pub use write::{WriteError, seal, write_header};
 
 use crate::grid::{Cell, GridError};
 use crate::prediction::{PredictionView, prediction_len};
@@ -98,7 +99,7 @@ pub enum TableError {
     BadGrid(GridError),
     /// A header field is out of its range.
     BadField {
-        /// Offset of the field in the image.
+        /// Offset of the field in the image, as in [`field`].
         offset: u16,
     },
     /// The block of a law is malformed.
@@ -108,6 +109,15 @@ pub enum TableError {
         /// Why.
         reason: BlockError,
     },
+}
+
+impl TableError {
+    /// This field of the header is out of its range.
+    pub(crate) const fn bad_field(field: &field::Field) -> Self {
+        Self::BadField {
+            offset: field.start as u16,
+        }
+    }
 }
 
 /// Why the block of a law is malformed.

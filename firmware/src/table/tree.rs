@@ -1,13 +1,13 @@
-//! The tree encoding: a k-d tree over cells whose leaves name an input level or an affine law.
+//! The tree encoding: a k-d tree over cells whose leaves name an input level or an affine piece.
 //!
 //! | offset | bytes | field |
 //! |---:|---:|---|
-//! | 0 | 1 | affine laws, 0..=31 |
-//! | 1 | 12 each | the laws, see [`AffineFunction`] |
+//! | 0 | 1 | affine pieces, 0..=31 |
+//! | 1 | 12 each | the pieces, see [`AffineFunction`] |
 //! | | | the tree, see [`Node`] |
 //!
-//! A leaf below 32 is an input level, 32 + k the k-th affine law. The tree answers for every cell: what lies outside the
-//! law's domain is the domain part's to say.
+//! A leaf below 32 is an input level, 32 + k the k-th affine piece. The tree answers for every cell.
+//! Which cells lie in the law's domain is for the domain part to say.
 //!
 //! The tree is checked once, from front to back with a stack of fixed size; after that a lookup visits at most
 //! [`TreeView::depth`] nodes and always ends at a leaf.
@@ -23,10 +23,10 @@ use crate::units::STATES;
 
 /// Deepest tree that the reader accepts.
 pub const TREE_DEPTH_MAX: u16 = 64;
-/// Leaves from here on are affine laws.
+/// Leaves from here on are affine pieces.
 pub const LEAF_AFFINE: u8 = 32;
-/// Most affine laws of a tree.
-pub const AFFINE_LAWS_MAX: u8 = 31;
+/// Most affine pieces of a tree.
+pub const AFFINE_PIECES_MAX: u8 = 31;
 
 /// A checked string of nodes; lookups end within [`NodesView::depth`] nodes.
 #[derive(Debug, Clone)]
@@ -196,36 +196,36 @@ fn long_skip(below: &[u8]) -> Option<&[u8]> {
 /// Reader of the tree encoding.
 #[derive(Debug, Clone)]
 pub struct TreeView<'t> {
-    laws: &'t [u8],
+    pieces: &'t [u8],
     levels: u8,
     nodes: NodesView<'t>,
 }
 
 impl<'t> TreeView<'t> {
-    /// Checks the laws and the tree.
+    /// Checks the pieces and the tree.
     ///
     /// # Errors
-    /// A part that is cut short, a law that could overflow on the grid, a broken or too deep tree, or a leaf that names
-    /// a level or law that does not exist.
+    /// A part that is cut short, a piece that could overflow on the grid, a broken or too deep tree, or
+    /// a leaf that names a level or piece that does not exist.
     pub fn parse(block: &'t [u8], grid: &Grid, levels: u8) -> Result<Self, BlockError> {
         let (count, rest) = block.split_first().ok_or(BlockError::BadShape)?;
-        if *count > AFFINE_LAWS_MAX {
+        if *count > AFFINE_PIECES_MAX {
             return Err(BlockError::BadShape);
         }
-        let (laws, nodes) = rest
+        let (pieces, nodes) = rest
             .split_at_checked(usize::from(*count) * AFFINE_LEN)
             .ok_or(BlockError::BadShape)?;
-        for law in laws.chunks_exact(AFFINE_LEN) {
-            if !AffineFunction::read(law).fits(grid) {
+        for piece in pieces.chunks_exact(AFFINE_LEN) {
+            if !AffineFunction::read(piece).fits(grid) {
                 return Err(BlockError::Overflow);
             }
         }
         let exists = |leaf: u8| match leaf.checked_sub(LEAF_AFFINE) {
             None => leaf < levels,
-            Some(law) => law < *count,
+            Some(piece) => piece < *count,
         };
         Ok(Self {
-            laws,
+            pieces,
             levels,
             nodes: NodesView::parse(nodes, exists)?,
         })
@@ -242,9 +242,9 @@ impl Encoding for TreeView<'_> {
         let leaf = self.nodes.leaf(cell)?;
         match leaf.checked_sub(LEAF_AFFINE) {
             None => Some(leaf),
-            Some(law) => {
-                let law = self.laws.get(usize::from(law) * AFFINE_LEN..)?;
-                Some(AffineFunction::read(law).level(cell, self.levels))
+            Some(piece) => {
+                let piece = self.pieces.get(usize::from(piece) * AFFINE_LEN..)?;
+                Some(AffineFunction::read(piece).level(cell, self.levels))
             }
         }
     }

@@ -9,7 +9,7 @@
 //! is the deadbeat input for k = 1; other k press harder or softer. Nothing rests on these laws being good: the game
 //! decides cell by cell whether one may be used.
 
-use firmware::table::{AffineFunction, LEVEL_FRACTION_BITS};
+use firmware::table::{AFFINE_FRACTION_BITS, AffineFunction};
 
 use crate::flow::Flow;
 use crate::grid_shape::GridShape;
@@ -59,7 +59,7 @@ fn law(
     press: f64,
     set_point: f64,
 ) -> Option<AffineFunction> {
-    let scale = f64::from(1u32 << LEVEL_FRACTION_BITS);
+    let scale = f64::from(1u32 << AFFINE_FRACTION_BITS);
     // Micro-GW of a level, and of the loss alone.
     let per_level = spec.fleet_power_gw() * spec.input.step * MICRO * gamma;
     let loss = net_power(spec, 0).mid();

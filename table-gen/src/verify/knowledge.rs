@@ -23,7 +23,9 @@
 //! they are known to be: the grid, or the set at the trigger, which must lie within the same bound. A coefficient that is wrong so makes ρ
 //! large, and with it every set.
 
-use firmware::prediction::{LEVEL_FRACTION_BITS, MEASURED_MAX, PHI_FRACTION_BITS, PredictionView};
+use firmware::prediction::{
+    MEASURED_MAX, PHI_FRACTION_BITS, PredictionView, RESPONSE_FRACTION_BITS,
+};
 use firmware::table::TableView;
 
 use super::model::{Drive, Model};
@@ -241,7 +243,7 @@ fn rho(
     let mut response = tick.gamma.map(|gamma| gamma * level);
     for ago in 1..=ticks as usize {
         for (d, rho) in rho.iter_mut().enumerate() {
-            let off = value(part.level(ago, d), LEVEL_FRACTION_BITS) - response[d];
+            let off = value(part.level(ago, d), RESPONSE_FRACTION_BITS) - response[d];
             *rho = up(*rho + up(off.magnitude() * last as f64));
         }
         response = apply(&tick.phi, &response);

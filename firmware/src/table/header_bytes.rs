@@ -1,0 +1,302 @@
+//! The bytes of the header: reader, writer and the seal of a whole image.
+//!
+//! Where each field stands is said once, in [`field`].
+
+use super::TableError;
+use super::bytes::{array_at, byte_at, i32_at, u16_at, u32_at};
+use super::checksum;
+use super::field::{self, Field, entry};
+use super::header::{Header, LAWS, LEVELS_MAX, LawEntry, PlantParameters};
+use crate::droop::Droop;
+use crate::grid::Grid;
+use crate::prediction::{DELAY_TICKS_MAX, LEVELS_KEPT, prediction_len};
+use crate::units::{Band, MICRO, STATES};
+
+/// First bytes of every table: "Holdfast decision table".
+pub const MAGIC: [u8; 4] = *b"HFDT";
+/// Byte-order mark as a little-endian reader must find it.
+pub const BYTE_ORDER_MARK: u16 = 0xFEFF;
+/// The version of the format that this module reads and writes.
+pub const FORMAT_VERSION: u16 = 2;
+/// Bytes of the header, directory included.
+pub const HEADER_LEN: usize = field::DIRECTORY.end;
+/// Bytes of a directory entry.
+pub const DIRECTORY_ENTRY_LEN: usize = entry::INPUTS_LEN.end;
+/// Bytes of the CRC-32 at the end, over all bytes before it.
+pub const CRC_LEN: usize = 4;
+
+/// Flag: Hold follows C1 and C2.
+const FLAG_STAY: u8 = 1;
+/// Kind in the directory of a law that the table does not hold.
+const ABSENT: u8 = 255;
+
+// The fields follow one another without gaps, and the directory holds an entry for each law.
+const _: () = {
+    let mut end = 0;
+    let mut index = 0;
+    while index < field::ALL.len() {
+        assert!(field::ALL[index].start == end && field::ALL[index].end > end);
+        end = field::ALL[index].end;
+        index += 1;
+    }
+    assert!(end == HEADER_LEN);
+    assert!(HEADER_LEN - field::DIRECTORY.start == LAWS * DIRECTORY_ENTRY_LEN);
+};
+
+// Every level fits the memory of the commands under way.
+const _: () = assert!(LEVELS_MAX <= LEVELS_KEPT);
+
+/// Where the entry of the law with this index begins.
+const fn entry_at(index: usize) -> usize {
+    field::DIRECTORY.start + index * DIRECTORY_ENTRY_LEN
+}
+
+impl Header {
+    /// Reads and checks the header, the length and the CRC.
+    ///
+    /// # Errors
+    /// The first check that fails, in the order magic, byte order, version, length, CRC, fields.
+    pub fn parse(bytes: &[u8]) -> Result<Self, TableError> {
+        let needed = HEADER_LEN + CRC_LEN;
+        if bytes.len() < needed {
+            return Err(TableError::TooShort {
+                found: bytes.len() as u32,
+                needed: needed as u32,
+            });
+        }
+        let magic = array_at(bytes, field::MAGIC.start).unwrap_or_default();
+        if magic != MAGIC {
+            return Err(TableError::BadMagic { found: magic });
+        }
+        match u16_at(bytes, field::BYTE_ORDER.start) {
+            BYTE_ORDER_MARK => {}
+            swapped if swapped == BYTE_ORDER_MARK.swap_bytes() => {
+                return Err(TableError::WrongEndianness);
+            }
+            found => return Err(TableError::BadByteOrderMark { found }),
+        }
+        let version = u16_at(bytes, field::VERSION.start);
+        if version != FORMAT_VERSION {
+            return Err(TableError::UnsupportedVersion {
+                found: version,
+                supported: FORMAT_VERSION,
+            });
+        }
+        let stated = u32_at(bytes, field::LENGTH.start);
+        if stated as usize != bytes.len() {
+            return Err(TableError::WrongLength {
+                found: bytes.len() as u32,
+                stated,
+            });
+        }
+        let (body, trailer) = bytes.split_at(bytes.len() - CRC_LEN);
+        let (computed, stored) = (checksum(body), u32_at(trailer, 0));
+        if computed != stored {
+            return Err(TableError::BadCrc { computed, stored });
+        }
+        Self::fields(bytes)
+    }
+
+    fn fields(bytes: &[u8]) -> Result<Self, TableError> {
+        let grid = read_grid(bytes)?;
+        let input_step_ppm = u32_at(bytes, field::INPUT_STEP.start);
+        let levels = byte_at(bytes, field::LEVELS.start);
+        check((1..=LEVELS_MAX).contains(&levels), &field::LEVELS)?;
+        let full = u64::from(input_step_ppm) * u64::from(levels - 1);
+        check(full <= MICRO as u64, &field::INPUT_STEP)?;
+        let flags = byte_at(bytes, field::FLAGS.start);
+        check(flags & !FLAG_STAY == 0, &field::FLAGS)?;
+        let tick_ms = u16_at(bytes, field::TICK.start);
+        check(tick_ms > 0, &field::TICK)?;
+        let period_ticks = u16_at(bytes, field::PERIOD.start);
+        check(period_ticks > 0, &field::PERIOD)?;
+        let delay_ticks = u16_at(bytes, field::DELAY.start);
+        // The prediction part lies between header and blocks.
+        let least = HEADER_LEN + prediction_len(delay_ticks) + CRC_LEN;
+        let has_room = delay_ticks <= DELAY_TICKS_MAX && bytes.len() >= least;
+        check(has_room, &field::DELAY)?;
+        let outer = read_band(bytes, &field::OUTER);
+        let inner = read_band(bytes, &field::INNER);
+        check(outer.low_uhz < outer.high_uhz, &field::OUTER)?;
+        let nested = outer.low_uhz <= inner.low_uhz && inner.high_uhz <= outer.high_uhz;
+        check(nested && inner.low_uhz < inner.high_uhz, &field::INNER)?;
+        let droop = Droop {
+            deadband_uhz: u32_at(bytes, field::DROOP_DEADBAND.start),
+            full_uhz: u32_at(bytes, field::DROOP_FULL.start),
+        };
+        check(droop.full_uhz > 0, &field::DROOP_FULL)?;
+        let plant = read_plant(bytes)?;
+        let mut laws = [None; LAWS];
+        for (index, law) in laws.iter_mut().enumerate() {
+            *law = read_entry(bytes, entry_at(index))?;
+        }
+        Ok(Self {
+            spec_hash: array_at(bytes, field::SPEC_HASH.start).unwrap_or_default(),
+            grid,
+            input_step_ppm,
+            levels,
+            stay: flags & FLAG_STAY != 0,
+            tick_ms,
+            period_ticks,
+            delay_ticks,
+            outer,
+            inner,
+            droop,
+            plant,
+            laws,
+        })
+    }
+}
+
+fn check(ok: bool, field: &Field) -> Result<(), TableError> {
+    if ok {
+        Ok(())
+    } else {
+        Err(TableError::bad_field(field))
+    }
+}
+
+fn read_grid(bytes: &[u8]) -> Result<Grid, TableError> {
+    let mut lower = [0i32; STATES];
+    let mut width = [0u32; STATES];
+    let mut count = [0u16; STATES];
+    for axis in 0..STATES {
+        lower[axis] = i32_at(bytes, field::LOWER_EDGE.start + 4 * axis);
+        width[axis] = u32_at(bytes, field::WIDTH.start + 4 * axis);
+        count[axis] = u16_at(bytes, field::COUNT.start + 2 * axis);
+    }
+    Grid::new(lower, width, count).map_err(TableError::BadGrid)
+}
+
+fn read_band(bytes: &[u8], field: &Field) -> Band {
+    Band {
+        low_uhz: i32_at(bytes, field.start),
+        high_uhz: i32_at(bytes, field.start + 4),
+    }
+}
+
+fn read_plant(bytes: &[u8]) -> Result<PlantParameters, TableError> {
+    let plant = PlantParameters {
+        governor_gain_kw_per_hz: i32_at(bytes, field::GOVERNOR_GAIN.start),
+        governor_time_us: u32_at(bytes, field::GOVERNOR_TIME.start),
+        turbine_time_us: u32_at(bytes, field::TURBINE_TIME.start),
+        lead_time_us: u32_at(bytes, field::LEAD_TIME.start),
+        lag_time_us: u32_at(bytes, field::LAG_TIME.start),
+        damping_kw_per_hz: u32_at(bytes, field::DAMPING.start),
+        inertia_kw_s_per_hz: u32_at(bytes, field::INERTIA.start),
+        fleet_kw: u32_at(bytes, field::FLEET.start),
+    };
+    check(plant.governor_time_us > 0, &field::GOVERNOR_TIME)?;
+    check(plant.turbine_time_us > 0, &field::TURBINE_TIME)?;
+    check(plant.lag_time_us > 0, &field::LAG_TIME)?;
+    check(plant.inertia_kw_s_per_hz > 0, &field::INERTIA)?;
+    Ok(plant)
+}
+
+/// The directory entry at an offset; `None` for a law that the table does not hold, whose kinds are
+/// [`ABSENT`] and whose other fields are 0.
+fn read_entry(bytes: &[u8], at: usize) -> Result<Option<LawEntry>, TableError> {
+    let entry = LawEntry {
+        domain_kind: byte_at(bytes, at + entry::DOMAIN_KIND.start),
+        inputs_kind: byte_at(bytes, at + entry::INPUTS_KIND.start),
+        worst_visits: u16_at(bytes, at + entry::WORST_VISITS.start),
+        domain_len: u32_at(bytes, at + entry::DOMAIN_LEN.start),
+        inputs_len: u32_at(bytes, at + entry::INPUTS_LEN.start),
+    };
+    if entry.inputs_kind != ABSENT {
+        return Ok(Some(entry));
+    }
+    let empty = entry.domain_kind == ABSENT
+        && entry.worst_visits == 0
+        && entry.domain_len == 0
+        && entry.inputs_len == 0;
+    check(empty, &(at..at + DIRECTORY_ENTRY_LEN))?;
+    Ok(None)
+}
+
+/// Why a table cannot be written.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum WriteError {
+    /// The image is longer than `u32::MAX` bytes, or shorter than header and CRC.
+    Length {
+        /// Bytes of the image.
+        found: u64,
+    },
+}
+
+/// The bytes of a header; length and CRC are filled in by [`seal`].
+pub fn write_header(header: &Header) -> [u8; HEADER_LEN] {
+    let mut out = [0u8; HEADER_LEN];
+    let mut put = |field: Field, bytes: &[u8]| out[field].copy_from_slice(bytes);
+    put(field::MAGIC, &MAGIC);
+    put(field::BYTE_ORDER, &BYTE_ORDER_MARK.to_le_bytes());
+    put(field::VERSION, &FORMAT_VERSION.to_le_bytes());
+    put(field::SPEC_HASH, &header.spec_hash);
+    let grid = &header.grid;
+    let lower = grid.lower_edge().map(i32::to_le_bytes);
+    put(field::LOWER_EDGE, lower.as_flattened());
+    let width = grid.width().map(u32::to_le_bytes);
+    put(field::WIDTH, width.as_flattened());
+    let count = grid.count().map(u16::to_le_bytes);
+    put(field::COUNT, count.as_flattened());
+    put(field::INPUT_STEP, &header.input_step_ppm.to_le_bytes());
+    put(field::LEVELS, &[header.levels]);
+    put(field::FLAGS, &[if header.stay { FLAG_STAY } else { 0 }]);
+    put(field::TICK, &header.tick_ms.to_le_bytes());
+    put(field::PERIOD, &header.period_ticks.to_le_bytes());
+    put(field::DELAY, &header.delay_ticks.to_le_bytes());
+    let band = |band: Band| [band.low_uhz, band.high_uhz].map(i32::to_le_bytes);
+    put(field::OUTER, band(header.outer).as_flattened());
+    put(field::INNER, band(header.inner).as_flattened());
+    let droop = header.droop;
+    put(field::DROOP_DEADBAND, &droop.deadband_uhz.to_le_bytes());
+    put(field::DROOP_FULL, &droop.full_uhz.to_le_bytes());
+    let plant = &header.plant;
+    let gain = plant.governor_gain_kw_per_hz;
+    put(field::GOVERNOR_GAIN, &gain.to_le_bytes());
+    put(field::GOVERNOR_TIME, &plant.governor_time_us.to_le_bytes());
+    put(field::TURBINE_TIME, &plant.turbine_time_us.to_le_bytes());
+    put(field::LEAD_TIME, &plant.lead_time_us.to_le_bytes());
+    put(field::LAG_TIME, &plant.lag_time_us.to_le_bytes());
+    put(field::DAMPING, &plant.damping_kw_per_hz.to_le_bytes());
+    put(field::INERTIA, &plant.inertia_kw_s_per_hz.to_le_bytes());
+    put(field::FLEET, &plant.fleet_kw.to_le_bytes());
+    let entries = header.laws.map(|law| write_entry(law.as_ref()));
+    put(field::DIRECTORY, entries.as_flattened());
+    out
+}
+
+fn write_entry(law: Option<&LawEntry>) -> [u8; DIRECTORY_ENTRY_LEN] {
+    let mut out = [0u8; DIRECTORY_ENTRY_LEN];
+    let mut put = |field: Field, bytes: &[u8]| out[field].copy_from_slice(bytes);
+    let Some(law) = law else {
+        put(entry::DOMAIN_KIND, &[ABSENT]);
+        put(entry::INPUTS_KIND, &[ABSENT]);
+        return out;
+    };
+    put(entry::DOMAIN_KIND, &[law.domain_kind]);
+    put(entry::INPUTS_KIND, &[law.inputs_kind]);
+    put(entry::WORST_VISITS, &law.worst_visits.to_le_bytes());
+    put(entry::DOMAIN_LEN, &law.domain_len.to_le_bytes());
+    put(entry::INPUTS_LEN, &law.inputs_len.to_le_bytes());
+    out
+}
+
+/// Fills in length and CRC of a whole image (header, blocks, four bytes of room for the CRC).
+///
+/// # Errors
+/// An image that is too long for the length field or too short for a header.
+pub fn seal(image: &mut [u8]) -> Result<(), WriteError> {
+    let wrong = WriteError::Length {
+        found: image.len() as u64,
+    };
+    let length = u32::try_from(image.len()).map_err(|_| wrong)?;
+    if image.len() < HEADER_LEN + CRC_LEN {
+        return Err(wrong);
+    }
+    image[field::LENGTH].copy_from_slice(&length.to_le_bytes());
+    let body = image.len() - CRC_LEN;
+    let crc = checksum(&image[..body]);
+    image[body..].copy_from_slice(&crc.to_le_bytes());
+    Ok(())
+}
