@@ -19,14 +19,15 @@ const COMPONENTS: &[(&str, &str)] = &[("rustfmt", "fmt"), ("clippy", "clippy")];
 struct Tool {
     /// Names under which it may be found; the first on the search path will do.
     programs: &'static [&'static str],
-    /// Debian packages that bring it. Recommended packages are left out, so name what it cannot do without. Of `a|b` the first
-    /// that the system's release has is taken.
+    /// Debian packages that bring it. Recommended packages are left out, so name what it cannot do
+    /// without. Of `a|b` the first that the system's release has is taken.
     packages: &'static [&'static str],
     /// Why it is needed.
     why: &'static str,
 }
 
-/// Every program that the steps need beside the Rust toolchain. To add or remove one, edit here alone.
+/// Every program that the steps need beside the Rust toolchain. To add or remove one, edit here
+/// alone.
 const TOOLS: &[Tool] = &[
     Tool {
         programs: &["qemu-system-arm"],
@@ -45,7 +46,8 @@ const TOOLS: &[Tool] = &[
     },
 ];
 
-/// The step `prerequisites`: installs what is missing where that is allowed, and otherwise says how to.
+/// The step `prerequisites`: installs what is missing where that is allowed, and otherwise says how
+/// to.
 pub(crate) fn prerequisites() -> Result<(), Failure> {
     for (component, subcommand) in COMPONENTS {
         if answer(cargo(), &[subcommand, "--version"]).is_none() {
@@ -74,7 +76,7 @@ fn rustup(kind: &str, name: &str) -> Result<(), Failure> {
             remedy: format!("install rustup (https://rustup.rs), then: rustup {kind} add {name}"),
         });
     }
-    run(Command::new("rustup").args([kind, "add", name]))
+    run(Command::new("rustup").args([kind, "add", name])).map(|_| ())
 }
 
 /// Whether the toolchain has the target's standard library, whoever installed it.
@@ -91,7 +93,8 @@ impl Tool {
     }
 }
 
-/// Installs the packages of `missing` by apt-get as root or with passwordless sudo, and looks again.
+/// Installs the packages of `missing` by apt-get as root or with passwordless sudo, and looks
+/// again.
 fn install(missing: &[&Tool]) -> Result<(), Failure> {
     for tool in missing {
         println!("    {} is missing: it {}", tool.programs[0], tool.why);
@@ -132,7 +135,8 @@ fn of_this_release(choice: &str) -> &str {
         .unwrap_or(choice)
 }
 
-/// How to call apt-get without being asked anything; `None` where there is no apt-get or no right to use it.
+/// How to call apt-get without being asked anything; `None` where there is no apt-get or no right
+/// to use it.
 fn administrator() -> Option<&'static [&'static str]> {
     on_path("apt-get")?;
     if answer("id", &["-u"]).as_deref() == Some("0") {

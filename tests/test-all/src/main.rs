@@ -1,18 +1,23 @@
 //! `cargo test-all`: everything that must hold before a change lands, in one command.
 //!
-//! Runs the steps of [`steps::STEPS`] in order, stops at the first that fails, and closes with one line
-//! `N passed, N failed` that counts steps. `cargo test-all --list` names the steps and `cargo test-all STEP...`
-//! runs only those named. Exit codes: 0 all passed, 1 a step failed, 2 bad arguments.
+//! Runs the steps of [`steps::STEPS`] in order and stops at the first that fails. Then it prints
+//! each step's time beside its budget, and one last line `N passed, N failed, N skipped` that
+//! counts steps; skipped are the steps that did not run and the tests that did not. `cargo test-all
+//! --list` names the steps and `cargo test-all STEP...` runs only those named. Exit codes: 0 all
+//! passed, 1 a step failed, 2 bad arguments.
 
+mod comments;
 mod process;
 mod steps;
+mod summary;
 mod tools;
 
 use std::fmt::Write as _;
 use std::process::ExitCode;
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
 use steps::{STEPS, Step};
+use summary::Summary;
 
 const USAGE: &str = "usage: cargo test-all [--list | STEP...]";
 
@@ -89,10 +94,10 @@ fn list() -> String {
     })
 }
 
-/// Runs the steps at `positions` up to the first failure, and prints the summary as the last line.
+/// Runs the steps at `positions` up to the first failure, prints the time of each, and the summary
+/// as the last line.
 fn run(positions: &[usize]) -> ExitCode {
-    let started = Instant::now();
-    let mut passed = 0;
+    let mut summary = Summary::default();
     let mut failure = None;
     for (index, &position) in positions.iter().enumerate() {
         let step = &STEPS[position];
@@ -103,37 +108,25 @@ fn run(positions: &[usize]) -> ExitCode {
             step.name,
             step.about
         );
-        let step_started = Instant::now();
-        if let Err(error) = step.run() {
+        let started = Instant::now();
+        let outcome = step.run();
+        let time = started.elapsed();
+        println!("    {}", summary.note(step, time, outcome.as_ref().ok()));
+        if let Err(error) = outcome {
+            summary.not_run = positions.len() - index - 1;
             failure = Some((step, error));
             break;
         }
-        passed += 1;
-        println!("    {} passed in {}", step.name, seconds(step_started));
     }
-    println!("\ntest-all took {}", seconds(started));
+    print!("\n{}", summary.times());
     if let Some((Step { name, .. }, error)) = &failure {
         println!("step '{name}' failed: {error}\nto run it alone: cargo test-all {name}");
     }
-    println!("{passed} passed, {} failed", u8::from(failure.is_some()));
+    println!("{}", summary.last_line());
     if failure.is_some() {
         ExitCode::FAILURE
     } else {
         ExitCode::SUCCESS
-    }
-}
-
-/// The time since `started`, as people read it.
-fn seconds(started: Instant) -> String {
-    readable(started.elapsed())
-}
-
-fn readable(elapsed: Duration) -> String {
-    let tenths = (elapsed.as_millis() + 50) / 100;
-    if tenths < 600 {
-        format!("{}.{} s", tenths / 10, tenths % 10)
-    } else {
-        format!("{} min {:02} s", tenths / 600, tenths % 600 / 10)
     }
 }
 
@@ -178,19 +171,5 @@ mod tests {
         assert_eq!(parsed(&["--list"]), Ok(Request::List));
         assert_eq!(list().lines().count(), STEPS.len());
         assert!(STEPS.iter().all(|step| list().contains(step.name)));
-    }
-
-    #[test]
-    fn elapsed_time_is_rounded_once() {
-        let cases = [
-            (49, "0.0 s"),
-            (50, "0.1 s"),
-            (59_949, "59.9 s"),
-            (59_950, "1 min 00 s"),
-            (125_000, "2 min 05 s"),
-        ];
-        for (millis, text) in cases {
-            assert_eq!(readable(Duration::from_millis(millis)), text);
-        }
     }
 }

@@ -1,6 +1,7 @@
 //! Programs outside this one: finding them, running them, and how that can fail.
 
 use std::ffi::{OsStr, OsString};
+use std::io::{BufRead, BufReader};
 use std::path::{Path, PathBuf};
 use std::process::{Command, ExitStatus, Stdio};
 use std::{env, fmt, io};
@@ -14,6 +15,10 @@ pub(crate) enum Failure {
     Status { command: String, status: ExitStatus },
     /// Something is missing and cannot be installed from here; `remedy` says what a person can do.
     Missing { what: String, remedy: String },
+    /// A file or folder of the source cannot be read.
+    Read { path: PathBuf, source: io::Error },
+    /// The source is not as it must be; what is wrong is printed above.
+    Found(String),
 }
 
 impl fmt::Display for Failure {
@@ -22,6 +27,8 @@ impl fmt::Display for Failure {
             Self::Start { command, source } => write!(f, "cannot start `{command}`: {source}"),
             Self::Status { command, status } => write!(f, "`{command}` ended with {status}"),
             Self::Missing { what, remedy } => write!(f, "missing: {what}\n{remedy}"),
+            Self::Read { path, source } => write!(f, "{}: {source}", path.display()),
+            Self::Found(what) => f.write_str(what),
         }
     }
 }
@@ -31,20 +38,63 @@ pub(crate) fn cargo() -> OsString {
     env::var_os("CARGO").unwrap_or_else(|| "cargo".into())
 }
 
-/// Prints the command, runs it without standard input, and waits for its end.
-pub(crate) fn run(command: &mut Command) -> Result<(), Failure> {
+/// Tests that a command ran, by what it printed.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub(crate) struct Tests {
+    pub(crate) passed: u32,
+    /// Left out by `#[ignore]`.
+    pub(crate) ignored: u32,
+}
+
+impl Tests {
+    /// Adds what a line says, if it closes a test program:
+    /// `test result: ok. 5 passed; 0 failed; 1 ignored; 0 measured; 2 filtered out; ...`.
+    fn note(&mut self, line: &str) {
+        let Some(counts) = line.strip_prefix("test result: ") else {
+            return;
+        };
+        let words: Vec<&str> = counts.split_whitespace().collect();
+        for pair in words.windows(2) {
+            let count = pair[0].parse().unwrap_or(0);
+            match pair[1] {
+                "passed;" => self.passed += count,
+                "ignored;" => self.ignored += count,
+                _ => {}
+            }
+        }
+    }
+}
+
+/// Prints the command, runs it without standard input, passes on what it prints, and waits for its
+/// end.
+pub(crate) fn run(command: &mut Command) -> Result<Tests, Failure> {
     let text = shown(command);
     println!("    $ {text}");
-    match command.stdin(Stdio::null()).status() {
-        Ok(status) if status.success() => Ok(()),
-        Ok(status) => Err(Failure::Status {
+    let start = |source| Failure::Start {
+        command: text.clone(),
+        source,
+    };
+    let mut child = command
+        .stdin(Stdio::null())
+        .stdout(Stdio::piped())
+        .spawn()
+        .map_err(start)?;
+    let mut tests = Tests::default();
+    if let Some(output) = child.stdout.take() {
+        // A line that is no text ends the reading, not the command; its status still counts.
+        for line in BufReader::new(output).lines().map_while(Result::ok) {
+            println!("{line}");
+            tests.note(&line);
+        }
+    }
+    let status = child.wait().map_err(start)?;
+    if status.success() {
+        Ok(tests)
+    } else {
+        Err(Failure::Status {
             command: text,
             status,
-        }),
-        Err(source) => Err(Failure::Start {
-            command: text,
-            source,
-        }),
+        })
     }
 }
 
@@ -116,6 +166,24 @@ mod tests {
             shown(&command),
             "RUSTDOCFLAGS='-D warnings' cargo doc --no-deps"
         );
+    }
+
+    #[test]
+    fn tests_are_counted_by_their_programs_last_lines() {
+        let mut tests = Tests::default();
+        for line in [
+            "running 5 tests",
+            "test result: ok. 5 passed; 0 failed; 1 ignored; 0 measured; 2 filtered out; finished in 0.00s",
+            "test result: FAILED. 1 passed; 7 failed; 2 ignored; 0 measured; 0 filtered out",
+            "3 passed; 4 ignored;",
+        ] {
+            tests.note(line);
+        }
+        let expected = Tests {
+            passed: 6,
+            ignored: 3,
+        };
+        assert_eq!(tests, expected);
     }
 
     #[test]
