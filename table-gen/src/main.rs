@@ -1,7 +1,10 @@
-//! The command-line interface; see [`table_gen::cli`].
+//! The command line of Holdfast; see [`cli`].
+#![forbid(unsafe_code)]
+
+mod cli;
 
 use std::process::ExitCode;
 
 fn main() -> ExitCode {
-    table_gen::cli::run()
+    cli::run()
 }

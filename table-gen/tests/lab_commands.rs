@@ -3,11 +3,11 @@
 
 use std::process::{Command, Output};
 
+use model::spec::Spec;
 use serde_json::Value;
-use table_gen::game::{Sweep, Watch};
-use table_gen::pipeline::{self, Encoding};
-use table_gen::spec::Spec;
-use table_gen::synthesis;
+use synth::game::{Sweep, Watch};
+use synth::pipeline::{self, Encoding};
+use synth::synthesis;
 
 struct Quiet;
 

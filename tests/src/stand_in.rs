@@ -10,7 +10,7 @@ use firmware::table::{
     bits_per_entry, seal, write_header,
 };
 use firmware::units::{Band, STATES};
-use table_gen::delay::Delay;
+use synth::delay::Delay;
 
 /// Input levels: steps of 5 %.
 const LEVELS: u8 = 21;

@@ -1,9 +1,9 @@
 //! The plant and the baseline against numbers that three independent programs agree on.
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on fails")]
 
-use table_gen::simulation::baseline;
-use table_gen::simulation::scenario::Scenario;
-use table_gen::spec::Spec;
+use lab::simulation::baseline;
+use lab::simulation::scenario::Scenario;
+use model::spec::Spec;
 
 fn spec(name: &str, deadband: f64) -> Spec {
     Spec::load(name, &[format!("baseline.deadband_hz={deadband:?}")]).unwrap()

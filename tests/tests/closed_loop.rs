@@ -6,11 +6,11 @@ use firmware::droop::Droop;
 use firmware::phase::Phase;
 use firmware::table::{TableError, TableView};
 use firmware::units::State;
-use table_gen::game::{Unwatched, Watch};
-use table_gen::pipeline;
-use table_gen::simulation::closed_loop::{self, Estimator};
-use table_gen::simulation::scenario::Scenario;
-use table_gen::spec::Spec;
+use lab::simulation::closed_loop::{self, Estimator};
+use lab::simulation::scenario::Scenario;
+use model::spec::Spec;
+use synth::game::{Unwatched, Watch};
+use synth::pipeline;
 
 fn table(name: &str, set: &[String]) -> (Spec, Vec<u8>) {
     let spec = Spec::load(name, set).unwrap();

@@ -8,13 +8,13 @@ use firmware::table::{
     DENSE_HEADER_LEN, HEADER_LEN, InputsKind, LawEntry, TableView, bits_per_entry,
 };
 use firmware::units::State;
-use table_gen::emit::{self, EncodedLaw};
-use table_gen::plant::GridPlant;
-use table_gen::simulation::closed_loop::{self, Estimator};
-use table_gen::simulation::propagator::Propagator;
-use table_gen::simulation::scenario::Scenario;
-use table_gen::spec::Spec;
-use table_gen::synthesis;
+use lab::simulation::closed_loop::{self, Estimator};
+use lab::simulation::scenario::Scenario;
+use model::plant::GridPlant;
+use model::propagator::Propagator;
+use model::spec::Spec;
+use synth::emit::{self, EncodedLaw};
+use synth::synthesis;
 
 fn load(name: &str, set: &[&str]) -> Spec {
     let set: Vec<String> = set.iter().map(|s| (*s).to_owned()).collect();

@@ -1,16 +1,16 @@
 //! The engine against a slow solver on random small plants, grids and targets, and on any number of threads.
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on fails")]
 
+use model::grid_shape::GridShape;
+use model::interval::Interval;
 use nalgebra::{DMatrix, DVector};
 use proptest::prelude::*;
-use table_gen::abstraction::affine::{AffineAbstraction, AffineInput, Growth};
-use table_gen::game::bitset::BitSet;
-use table_gen::game::guard::Unguarded;
-use table_gen::game::reach::reach;
-use table_gen::game::safety::safety;
-use table_gen::game::{NOT_WON, Unwatched};
-use table_gen::grid_shape::GridShape;
-use table_gen::interval::Interval;
+use synth::abstraction::affine::{AffineAbstraction, AffineInput, Growth};
+use synth::game::bitset::BitSet;
+use synth::game::guard::Unguarded;
+use synth::game::reach::reach;
+use synth::game::safety::safety;
+use synth::game::{NOT_WON, Unwatched};
 use tests::reference::SlowGame;
 
 const D: usize = 3;
@@ -151,14 +151,14 @@ proptest! {
 
 #[test]
 fn the_answer_does_not_depend_on_the_number_of_threads() {
-    use table_gen::spec::Spec;
+    use model::spec::Spec;
     let spec = Spec::load("paper-bi", &[]).unwrap();
     let solve = |threads| {
         let pool = rayon::ThreadPoolBuilder::new()
             .num_threads(threads)
             .build()
             .unwrap();
-        pool.install(|| table_gen::synthesis::synthesise(&spec, &|_| Box::new(Unwatched)).unwrap())
+        pool.install(|| synth::synthesis::synthesise(&spec, &|_| Box::new(Unwatched)).unwrap())
     };
     let one = solve(1);
     for threads in [2, 8] {
@@ -167,7 +167,7 @@ fn the_answer_does_not_depend_on_the_number_of_threads() {
             one.c1.solution == other.c1.solution,
             "C1 on {threads} threads"
         );
-        let c2 = |s: &table_gen::synthesis::Synthesis| s.c2.clone().unwrap().solution;
+        let c2 = |s: &synth::synthesis::Synthesis| s.c2.clone().unwrap().solution;
         assert!(c2(&one) == c2(&other), "C2 on {threads} threads");
     }
 }

@@ -14,9 +14,9 @@ use firmware::phase::{Phase, PhaseState, Step};
 use firmware::prediction::History;
 use firmware::table::TableView;
 use firmware::units::State;
-use table_gen::delay::Delay;
-use table_gen::simulation::propagator::Propagator;
-use table_gen::spec::Spec;
+use model::propagator::Propagator;
+use model::spec::Spec;
+use synth::delay::Delay;
 use tests::pil::run::plant;
 use tests::{root, stand_in};
 

@@ -3,8 +3,8 @@
 
 use firmware::grid::{Cell, Grid};
 use firmware::units::State;
-use table_gen::spec::Spec;
-use table_gen::synthesis;
+use model::spec::Spec;
+use synth::synthesis;
 
 /// Walks every edge of every axis of a grid, the other axes held at a point inside.
 fn edges(grid: &Grid) {

@@ -4,16 +4,16 @@
 //! others by a solver with a tolerance of 1e-9 instead of outward rounding, hence the 0.1 %.
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on fails")]
 
-use table_gen::abstraction::affine::{AffineAbstraction, AffineInput, Growth};
-use table_gen::game::bitset::BitSet;
-use table_gen::game::guard::Unguarded;
-use table_gen::game::reach::reach;
-use table_gen::game::safety::safety;
-use table_gen::game::{Unwatched, Watch};
-use table_gen::interval::Interval;
-use table_gen::plant::GridPlant;
-use table_gen::spec::Spec;
-use table_gen::synthesis::{self, Synthesis};
+use model::interval::Interval;
+use model::plant::GridPlant;
+use model::spec::Spec;
+use synth::abstraction::affine::{AffineAbstraction, AffineInput, Growth};
+use synth::game::bitset::BitSet;
+use synth::game::guard::Unguarded;
+use synth::game::reach::reach;
+use synth::game::safety::safety;
+use synth::game::{Unwatched, Watch};
+use synth::synthesis::{self, Synthesis};
 
 fn synthesise(name: &str, set: &[&str]) -> (Spec, Synthesis) {
     let overrides: Vec<String> = set.iter().map(|s| (*s).to_owned()).collect();

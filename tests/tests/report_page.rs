@@ -5,17 +5,17 @@ use std::process::Command;
 use std::sync::OnceLock;
 
 use firmware::table::TableView;
+use lab::report::figure::thin;
+use lab::report::study::{BaselineEvent, Study, frequency, steady_states};
+use lab::report::{Findings, Rendered, render_studies};
+use lab::simulation::closed_loop::{Estimator, simulate};
+use lab::simulation::scenario::Scenario;
+use lab::simulation::trajectory::Run;
+use model::spec::Spec;
 use serde_json::Value;
-use table_gen::game::{Sweep, Watch};
-use table_gen::pipeline::{self, Encoding};
-use table_gen::report::figure::thin;
-use table_gen::report::study::{BaselineEvent, Study, frequency, steady_states};
-use table_gen::report::{Findings, Rendered, render_studies};
-use table_gen::simulation::closed_loop::{Estimator, simulate};
-use table_gen::simulation::scenario::Scenario;
-use table_gen::simulation::trajectory::Run;
-use table_gen::spec::Spec;
-use table_gen::synthesis;
+use synth::game::{Sweep, Watch};
+use synth::pipeline::{self, Encoding};
+use synth::synthesis;
 
 /// Runs of the robustness section: enough to fill it.
 const RUNS: usize = 20;

@@ -2,12 +2,12 @@
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on fails")]
 
 use nalgebra::{DMatrix, DVector};
-use table_gen::abstraction::Abstraction;
-use table_gen::abstraction::growth::{GrowthAbstraction, GrowthBound};
-use table_gen::boost_converter::{self, PERIOD_S};
-use table_gen::game::bitset::BitSet;
-use table_gen::game::guard::Unguarded;
-use table_gen::game::{Unwatched, safety::safety};
+use synth::abstraction::Abstraction;
+use synth::abstraction::growth::{GrowthAbstraction, GrowthBound};
+use synth::boost_converter::{self, PERIOD_S};
+use synth::game::bitset::BitSet;
+use synth::game::guard::Unguarded;
+use synth::game::{Unwatched, safety::safety};
 use tests::reference::SlowGame;
 
 const CELLS: u32 = 60;

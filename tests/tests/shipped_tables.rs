@@ -1,10 +1,9 @@
 //! The tables in firmware/tables: made again from their specs byte for byte, and proven.
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on fails")]
 
-use table_gen::game::{Unwatched, Watch};
-use table_gen::pipeline;
-use table_gen::spec::Spec;
-use table_gen::verify;
+use model::spec::Spec;
+use synth::game::{Unwatched, Watch};
+use synth::pipeline;
 
 #[test]
 fn every_shipped_table_regenerates_and_is_proven() {

@@ -6,16 +6,16 @@
 //! outside if it is by more than that.
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on fails")]
 
+use model::plant::GridPlant;
+use model::propagator::Propagator;
+use model::spec::Spec;
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
-use table_gen::abstraction::Abstraction;
-use table_gen::abstraction::affine::AffineInput;
-use table_gen::abstraction::tube::TubeGuard;
-use table_gen::game::guard::Guard;
-use table_gen::plant::GridPlant;
-use table_gen::simulation::propagator::Propagator;
-use table_gen::spec::Spec;
-use table_gen::synthesis;
+use synth::abstraction::Abstraction;
+use synth::abstraction::affine::AffineInput;
+use synth::abstraction::tube::TubeGuard;
+use synth::game::guard::Guard;
+use synth::synthesis;
 
 /// Pieces of a period on which loss and participation are held.
 const PIECES: usize = 5;

@@ -5,10 +5,10 @@ use std::path::{Path, PathBuf};
 use firmware::table::TableView;
 
 use super::{Failure, OutputArgs, Overrides, output, progress};
-use crate::budget::{self, Budget, sweep};
-use crate::compress::{self, Options};
-use crate::spec::Spec;
-use crate::synthesis;
+use model::spec::Spec;
+use synth::budget::{self, Budget, sweep};
+use synth::compress::{self, Options};
+use synth::synthesis;
 
 /// Arguments of `budget`.
 #[derive(Debug, clap::Args)]

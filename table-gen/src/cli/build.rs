@@ -9,15 +9,15 @@ use serde::Serialize;
 use super::files::write_all;
 use super::synth::SynthReport;
 use super::{Failure, OutputArgs, SpecArgs, output, progress, simulate, verify};
-use crate::budget;
-use crate::compress::{LawReport, Options, VISITS_GOAL};
-use crate::pipeline::{self, Encoding};
-use crate::report::{self, Findings};
-use crate::simulation::closed_loop::{self, Estimator};
-use crate::simulation::monitor::Summary;
-use crate::simulation::scenario::Scenario;
-use crate::simulation::trajectory::PhaseSpan;
-use crate::synthesis;
+use lab::report::{self, Findings};
+use lab::simulation::closed_loop::{self, Estimator};
+use lab::simulation::monitor::Summary;
+use lab::simulation::scenario::Scenario;
+use lab::simulation::trajectory::PhaseSpan;
+use synth::budget;
+use synth::compress::{LawReport, Options, VISITS_GOAL};
+use synth::pipeline::{self, Encoding};
+use synth::synthesis;
 
 /// Arguments of `build`.
 #[derive(Debug, clap::Args)]

@@ -5,7 +5,7 @@ use serde::Serialize;
 
 use super::trace::TraceArgs;
 use super::{Failure, OutputArgs, output, plot};
-use crate::counterfactual::{self, Counterfactual, LIMITS, PlantAnswer, Question};
+use lab::counterfactual::{self, Counterfactual, LIMITS, PlantAnswer, Question};
 
 /// Most draws of the disturbance.
 const DRAWS_MAX: usize = 100_000;

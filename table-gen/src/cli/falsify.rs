@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use super::{Failure, OutputArgs, Overrides, output};
-use crate::falsify;
+use verify::falsify;
 
 /// Arguments of `falsify`.
 #[derive(Debug, clap::Args)]

@@ -7,12 +7,12 @@ use firmware::table::TableView;
 use serde::Serialize;
 
 use super::{Failure, OutputArgs, SpecArgs, output, plot, progress, simulate};
-use crate::fleet::measure::FleetMeasures;
-use crate::fleet::{self, FleetConfig, FleetRun, INSTANCES_MAX};
-use crate::pipeline;
-use crate::simulation::NOMINAL_HZ;
-use crate::simulation::monitor::Summary;
-use crate::simulation::scenario::Scenario;
+use lab::fleet::measure::FleetMeasures;
+use lab::fleet::{self, FleetConfig, FleetRun, INSTANCES_MAX};
+use lab::simulation::NOMINAL_HZ;
+use lab::simulation::monitor::Summary;
+use lab::simulation::scenario::Scenario;
+use synth::pipeline;
 
 /// Arguments of `fleet`.
 #[derive(Debug, clap::Args)]

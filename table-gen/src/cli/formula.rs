@@ -5,8 +5,9 @@ use std::path::PathBuf;
 use serde::Serialize;
 
 use super::{Failure, OutputArgs, SpecArgs, output};
-use crate::logic::{self, Compiled, Sample};
-use crate::replay::trace;
+use lab::replay::trace;
+use lab::robustness::{Sample, robustness};
+use model::logic::{self, Compiled};
 
 /// Nominal frequency \[Hz\].
 const NOMINAL_HZ: f64 = 50.0;
@@ -59,7 +60,7 @@ pub(super) fn run(args: &FormulaArgs) -> Result<(), Failure> {
             ("I1", spec.requirements.outer_hz),
             ("I2", spec.requirements.inner_hz),
         ];
-        let value = logic::robustness(&formula, &samples, &named).map_err(Failure::bad)?;
+        let value = robustness(&formula, &samples, &named).map_err(Failure::bad)?;
         report.robustness = Some(value);
     } else {
         let compiled =

@@ -7,7 +7,7 @@ use firmware::table::{Law, TableView};
 use serde::Serialize;
 
 use super::{Failure, OutputArgs, output};
-use crate::inspect::{self, LawSurvey, slice};
+use synth::inspect::{self, LawSurvey, slice};
 
 /// Arguments of `inspect`.
 #[derive(Debug, clap::Args)]

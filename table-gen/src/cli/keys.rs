@@ -3,7 +3,7 @@
 use serde::Serialize;
 
 use super::{Failure, OutputArgs, output};
-use crate::spec::reference;
+use model::spec::reference;
 
 /// Arguments of `keys`.
 #[derive(Debug, clap::Args)]

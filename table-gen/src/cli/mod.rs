@@ -29,7 +29,7 @@ use std::process::ExitCode;
 
 use clap::{Args, Parser, Subcommand};
 
-use crate::spec::{Spec, SpecError};
+use model::spec::{Spec, SpecError};
 
 /// Synthesises, compresses, verifies and simulates frequency-response tables for EV chargers.
 #[derive(Debug, Parser)]
@@ -73,7 +73,7 @@ enum Command {
 
 /// The spec and what overrides it.
 #[derive(Debug, Clone, Args)]
-pub struct SpecArgs {
+pub(crate) struct SpecArgs {
     /// Name of a shipped spec, or path of a TOML file
     #[arg(value_name = "SPEC")]
     spec: String,
@@ -83,7 +83,7 @@ pub struct SpecArgs {
 
 /// Options of every command that reads a spec.
 #[derive(Debug, Clone, Args)]
-pub struct Overrides {
+pub(crate) struct Overrides {
     /// Override a key of the spec, e.g. plant.inertia_gw_s_per_hz=3; KEY=none removes an optional one
     #[arg(long = "set", value_name = "KEY=VALUE")]
     set: Vec<String>,
@@ -91,7 +91,7 @@ pub struct Overrides {
 
 /// Options of every command.
 #[derive(Debug, Clone, Copy, Args)]
-pub struct OutputArgs {
+pub(crate) struct OutputArgs {
     /// Print one JSON object on stdout and nothing else there
     #[arg(long)]
     json: bool,
@@ -113,7 +113,7 @@ impl Overrides {
 
 /// Why a command did not end with 0.
 #[derive(Debug)]
-pub enum Failure {
+pub(crate) enum Failure {
     /// The answer is "no".
     No(String),
     /// The input is bad, or a file cannot be read or written.
@@ -133,20 +133,20 @@ impl From<SpecError> for Failure {
     }
 }
 
-impl From<crate::pipeline::PipelineError> for Failure {
-    fn from(error: crate::pipeline::PipelineError) -> Self {
+impl From<::synth::pipeline::PipelineError> for Failure {
+    fn from(error: ::synth::pipeline::PipelineError) -> Self {
         match error {
-            crate::pipeline::PipelineError::Synthesis(error) => error.into(),
-            crate::pipeline::PipelineError::Compress(error) => Self::No(error.to_string()),
+            ::synth::pipeline::PipelineError::Synthesis(error) => error.into(),
+            ::synth::pipeline::PipelineError::Compress(error) => Self::No(error.to_string()),
             other => Self::bad(other),
         }
     }
 }
 
-impl From<crate::synthesis::SynthesisError> for Failure {
-    fn from(error: crate::synthesis::SynthesisError) -> Self {
-        use crate::game::GameError;
-        use crate::synthesis::SynthesisError as E;
+impl From<::synth::synthesis::SynthesisError> for Failure {
+    fn from(error: ::synth::synthesis::SynthesisError) -> Self {
+        use ::synth::game::GameError;
+        use ::synth::synthesis::SynthesisError as E;
         match &error {
             E::Delay { .. } | E::Grid(_) | E::Abstraction(_) => Self::bad(error),
             E::Game {
@@ -159,7 +159,7 @@ impl From<crate::synthesis::SynthesisError> for Failure {
 }
 
 /// Runs the command line of this process.
-pub fn run() -> ExitCode {
+pub(crate) fn run() -> ExitCode {
     let cli = match Cli::try_parse() {
         Ok(cli) => cli,
         Err(error) => {

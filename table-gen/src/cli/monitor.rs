@@ -4,7 +4,7 @@ use std::fs::File;
 use std::path::PathBuf;
 
 use super::{Failure, OutputArgs, output, progress};
-use crate::monitor;
+use lab::monitor;
 
 /// Arguments of `monitor`.
 #[derive(Debug, clap::Args)]

@@ -9,11 +9,11 @@ use serde::Serialize;
 
 use super::simulate::{Chances, SimulateArgs};
 use super::{Failure, output, progress, simulate};
-use crate::simulation::closed_loop::ClosedLoop;
-use crate::simulation::monte_carlo::draws::Draws;
-use crate::simulation::monte_carlo::statistics::{Quantiles, Share};
-use crate::simulation::monte_carlo::{self, RUNS_MAX, Statistics};
-use crate::spec::Spec;
+use lab::simulation::closed_loop::ClosedLoop;
+use lab::simulation::monte_carlo::draws::Draws;
+use lab::simulation::monte_carlo::statistics::{Quantiles, Share};
+use lab::simulation::monte_carlo::{self, RUNS_MAX, Statistics};
+use model::spec::Spec;
 
 /// Runs between two looks at the clock and at Ctrl-C.
 const BATCH: usize = 1000;

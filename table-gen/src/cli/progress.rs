@@ -12,7 +12,7 @@ use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
 use super::output::grouped;
 use super::time_left::Pace;
-use crate::game::{Sweep, Watch};
+use synth::game::{Sweep, Watch};
 
 /// Work shorter than this shows no progress.
 const QUIET: Duration = Duration::from_secs(1);

@@ -7,8 +7,8 @@ use serde::Serialize;
 
 use super::trace::TraceArgs;
 use super::{Failure, OutputArgs, output, plot, simulate};
-use crate::replay::{Replay, replay};
-use crate::simulation::trajectory::PhaseSpan;
+use lab::replay::{Replay, replay};
+use lab::simulation::trajectory::PhaseSpan;
 
 /// Arguments of `replay`.
 #[derive(Debug, clap::Args)]

@@ -8,18 +8,18 @@ use serde_json::Value;
 
 use super::files::write_all;
 use super::{Failure, OutputArgs, SpecArgs, output, progress};
-use crate::counterfactual::{self, Question};
-use crate::fleet::{self, FleetConfig, INSTANCES_MAX};
-use crate::pipeline;
-use crate::replay;
-use crate::replay::trace::{self, Trace};
-use crate::report::section::Section;
-use crate::report::study::Study;
-use crate::report::{self, Findings, ROBUSTNESS_RUNS, record};
-use crate::simulation::monitor::Summary;
-use crate::simulation::monte_carlo::{RUNS_MAX, Statistics};
-use crate::simulation::scenario::Scenario;
-use crate::spec::Spec;
+use lab::counterfactual::{self, Question};
+use lab::fleet::{self, FleetConfig, INSTANCES_MAX};
+use lab::replay;
+use lab::replay::trace::{self, Trace};
+use lab::report::section::Section;
+use lab::report::study::Study;
+use lab::report::{self, Findings, ROBUSTNESS_RUNS, record};
+use lab::simulation::monitor::Summary;
+use lab::simulation::monte_carlo::{RUNS_MAX, Statistics};
+use lab::simulation::scenario::Scenario;
+use model::spec::Spec;
+use synth::pipeline;
 
 /// Arguments of `report`.
 #[derive(Debug, clap::Args)]

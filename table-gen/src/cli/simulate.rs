@@ -8,17 +8,17 @@ use serde::Serialize;
 
 use super::band::{Band, PerState};
 use super::{Failure, OutputArgs, SpecArgs, monte_carlo, output, plot, progress};
-use crate::pipeline;
-use crate::report::limits::symbolic_under;
-use crate::simulation::beyond::Disturbances;
-use crate::simulation::beyond::file::ScenarioFile;
-use crate::simulation::closed_loop::{ClosedLoop, Estimator};
-use crate::simulation::monitor::Summary;
-use crate::simulation::recorder::History;
-use crate::simulation::scenario::Scenario;
-use crate::simulation::trajectory::{PhaseSpan, Run};
-use crate::simulation::{ControllerKind, NOMINAL_HZ, baseline};
-use crate::spec::Spec;
+use lab::report::limits::symbolic_under;
+use lab::simulation::beyond::Disturbances;
+use lab::simulation::beyond::file::ScenarioFile;
+use lab::simulation::closed_loop::{ClosedLoop, Estimator};
+use lab::simulation::monitor::Summary;
+use lab::simulation::recorder::History;
+use lab::simulation::scenario::Scenario;
+use lab::simulation::trajectory::{PhaseSpan, Run};
+use lab::simulation::{ControllerKind, NOMINAL_HZ, baseline};
+use model::spec::Spec;
+use synth::pipeline;
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum ControllerArg {
@@ -254,7 +254,7 @@ fn symbolic(
 
 /// Time and absolute frequency of a run's samples.
 pub(super) fn frequency(run: &Run) -> Vec<(f64, f64)> {
-    let point = |sample: &crate::simulation::trajectory::Sample| {
+    let point = |sample: &lab::simulation::trajectory::Sample| {
         (sample.time_s, NOMINAL_HZ + sample.state[0])
     };
     run.samples.iter().map(point).collect()

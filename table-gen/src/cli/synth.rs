@@ -3,9 +3,9 @@
 use serde::Serialize;
 
 use super::{Failure, OutputArgs, SpecArgs, output, progress};
-use crate::spec::Spec;
-use crate::synthesis::{self, SolvedLaw, Synthesis};
-use crate::usage;
+use model::spec::Spec;
+use synth::synthesis::{self, SolvedLaw, Synthesis};
+use synth::usage;
 
 /// Arguments of `synth`.
 #[derive(Debug, clap::Args)]
@@ -108,7 +108,7 @@ fn problem(name: &'static str, law: &SolvedLaw) -> ProblemReport {
     let ranks = &law.solution.ranks;
     let worst = ranks
         .iter()
-        .filter(|rank| **rank != crate::game::NOT_WON)
+        .filter(|rank| **rank != synth::game::NOT_WON)
         .max();
     ProblemReport {
         name,

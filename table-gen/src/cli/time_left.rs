@@ -2,7 +2,7 @@
 
 use std::collections::VecDeque;
 
-use crate::game::Sweep;
+use synth::game::Sweep;
 
 /// Sweeps that the estimate looks back on.
 const WINDOW: usize = 4;

@@ -3,9 +3,9 @@
 use std::path::PathBuf;
 
 use super::{Failure, Overrides, progress};
-use crate::pipeline;
-use crate::replay::trace::{self, Trace};
-use crate::spec::Spec;
+use lab::replay::trace::{self, Trace};
+use model::spec::Spec;
+use synth::pipeline;
 
 /// Arguments of every command on a recorded frequency.
 #[derive(Debug, clap::Args)]

@@ -3,8 +3,8 @@
 use std::path::PathBuf;
 
 use super::{Failure, Overrides, output, progress};
-use crate::spec::Spec;
-use crate::verify::{self, Claim, Counterexample, Verdict, VerifyError};
+use model::spec::Spec;
+use verify::{self, Claim, Counterexample, Verdict, VerifyError};
 
 /// Arguments of `verify`.
 #[derive(Debug, clap::Args)]

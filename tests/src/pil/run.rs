@@ -6,10 +6,10 @@ use firmware::fault::Mode;
 use firmware::link::session::Session;
 use firmware::link::{Request, Response, Setup};
 use firmware::table::PlantParameters;
+use model::plant::GridPlant;
+use model::propagator::Propagator;
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
-use table_gen::plant::GridPlant;
-use table_gen::simulation::propagator::Propagator;
 
 use super::mains::MainsModel;
 use super::qemu::{PilError, Target};

@@ -1,0 +1,341 @@
+//! A recorded event, counterfactually: what would the frequency have been if the fleet had responded?
+//!
+//! The power that was missing is inferred from the record through the plant ([`smoother`]), and the plant runs once more with
+//! it, now with the firmware in the loop, which sees the frequency alone ([`rerun`]). The answer inherits the plant, so it is
+//! given for two: the spec's, whose governors answer without limit, and one whose governors stop at the response that was
+//! held on the day. [`LIMITS`] says what neither knows.
+
+pub mod rerun;
+pub mod smoother;
+
+use std::borrow::Cow;
+
+use firmware::table::TableView;
+use rand::SeedableRng;
+use rand_pcg::Pcg64;
+use rayon::prelude::*;
+use serde::Serialize;
+
+use crate::replay::trace::Trace;
+use crate::simulation::NOMINAL_HZ;
+use crate::simulation::beyond::Governor;
+use crate::simulation::closed_loop::LoopError;
+use crate::simulation::monitor::Summary;
+use crate::simulation::monte_carlo::statistics::Quantiles;
+use crate::simulation::recorder::History;
+use model::plant::GridPlant;
+use model::spec::Spec;
+use rerun::Rerun;
+use smoother::{Disturbance, Smoother};
+
+/// Where the low-frequency relays begin to disconnect demand \[Hz\].
+pub const RELAY_HZ: f64 = 48.8;
+/// Levels that chargers could have kept the frequency above \[Hz\]: the containment, and the relays.
+pub const LEVELS_HZ: [f64; 2] = [49.2, RELAY_HZ];
+/// Fleet powers tried for the levels \[GW\]: in steps of this, up to [`FLEET_MAX_GW`].
+const FLEET_STEP_GW: f64 = 0.05;
+/// See [`FLEET_STEP_GW`].
+const FLEET_MAX_GW: f64 = 5.0;
+
+/// What the answer does not know.
+pub const LIMITS: [&str; 6] = [
+    "The missing power is what the plant needs to explain the record: it holds every response that the plant does not model, and every error of the plant's parameters.",
+    "The spec's governors answer in proportion and without limit: they explain a fall to 48.8 Hz by far more missing power than was lost, and take back what the chargers give. The limited governors stop at the response stated; with them the inferred loss can be compared with the reported one.",
+    "The record has one sample a second: a loss within a second is smeared over it, and the first second's slope is uncertain.",
+    "Demand that relays disconnected at 48.8 Hz is in the record as power that came back. Where the chargers keep the frequency higher this would not have happened: one variant takes it out, by the amount stated, from the sample at which the record passes 48.8 Hz.",
+    "Embedded generation that tripped because the frequency fell so low is in the record as missing power; with the chargers some of it would have stayed. This makes the answer pessimistic by an amount that is not known here.",
+    "The law was synthesised for its spec's loss and fleet, not for this event: nothing here is proved. Where no law covers the state, the chargers follow the droop.",
+];
+
+/// Why there is no answer.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum CounterfactualError {
+    /// The trace's samples do not fall on the firmware's ticks.
+    #[error("samples are {step_s} s apart; allowed: a whole number of ticks of {tick_s} s")]
+    Step {
+        /// Time between samples \[s\].
+        step_s: f64,
+        /// The table's tick \[s\].
+        tick_s: f64,
+    },
+    /// The loop cannot run.
+    #[error(transparent)]
+    Loop(#[from] LoopError),
+}
+
+/// What is asked.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Question {
+    /// Fleets to try \[GW\].
+    pub fleets_gw: Cow<'static, [f64]>,
+    /// Demand that relays disconnected at [`RELAY_HZ`] \[GW\].
+    pub relieved_gw: f64,
+    /// Response that the governors held on the day \[GW\], for the second plant.
+    pub governor_max_gw: f64,
+    /// Draws from the posterior of the disturbance.
+    pub draws: usize,
+    /// Their seed.
+    pub seed: u64,
+}
+
+impl Question {
+    /// The paper's two fleets on 9 August 2019: about 1 GW of demand was disconnected, and about 1 GW of response was held.
+    pub const PAPER: Self = Self {
+        fleets_gw: Cow::Borrowed(&[0.7, 1.4]),
+        relieved_gw: 1.0,
+        governor_max_gw: 1.0,
+        draws: 50,
+        seed: 0,
+    };
+}
+
+/// One fleet's answer.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct FleetAnswer {
+    /// Power of the fleet \[GW\].
+    pub fleet_gw: f64,
+    /// Chargers of the spec's power that make it up.
+    pub chargers: u64,
+    /// With the disturbance's mean.
+    pub summary: Summary,
+    /// Nadir over draws of the disturbance \[Hz\].
+    pub nadir_hz: Quantiles,
+}
+
+/// Chargers that keep the frequency above a level.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct LevelAnswer {
+    /// The level \[Hz\].
+    pub level_hz: f64,
+    /// Power of the fleet from which on every larger one tried keeps it \[GW\]; `null` if none up to 5 GW does.
+    pub fleet_gw: Option<f64>,
+    /// The same in chargers of the spec's power.
+    pub chargers: Option<u64>,
+}
+
+/// The answers for one reading of the disturbance.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Variant {
+    /// Which.
+    pub name: &'static str,
+    /// Demand put back from the moment at which the record passes 48.8 Hz \[GW\].
+    pub put_back_gw: f64,
+    /// By fleet.
+    pub fleets: Vec<FleetAnswer>,
+    /// By level.
+    pub levels: Vec<LevelAnswer>,
+}
+
+/// Points of a curve with its band: time, value, half-width.
+pub type Curve = Vec<(f64, f64, f64)>;
+
+/// The answers on one plant.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct PlantAnswer {
+    /// Which plant.
+    pub name: &'static str,
+    /// Standard deviation of the fitted walk \[GW in a step\].
+    pub walk_gw: f64,
+    /// Standard deviation of the fitted readings \[Hz\].
+    pub reading_hz: f64,
+    /// Largest distance of this plant's frequency without chargers from the record \[Hz\].
+    pub misfit_hz: f64,
+    /// The most power that was missing \[GW\].
+    pub largest_missing_gw: f64,
+    /// With what relays disconnected left in, and taken out.
+    pub variants: Vec<Variant>,
+    /// What was missing.
+    #[serde(skip)]
+    pub disturbance: Disturbance,
+    /// Frequency and participation with each fleet, in the last variant \[s, Hz, 1\].
+    #[serde(skip)]
+    pub curves: Vec<(f64, Curve)>,
+}
+
+/// The whole answer.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Counterfactual {
+    /// The recorded frequency \[s, Hz\].
+    pub recorded: Vec<(f64, f64)>,
+    /// Lowest recorded frequency \[Hz\].
+    pub recorded_nadir_hz: f64,
+    /// When the record first passes 48.8 Hz \[s\].
+    pub relay_s: Option<f64>,
+    /// On each plant.
+    pub plants: Vec<PlantAnswer>,
+}
+
+/// Answers the question for a recorded event.
+///
+/// # Errors
+/// Samples that are no whole number of ticks apart, or a plant that the observer cannot follow.
+pub fn answer(
+    spec: &Spec,
+    table: &TableView<'_>,
+    trace: &Trace,
+    question: &Question,
+) -> Result<Counterfactual, CounterfactualError> {
+    let step_s = trace.samples[1].time_s - trace.samples[0].time_s;
+    let tick_s = f64::from(table.header().tick_ms) / 1000.0;
+    let ticks = step_s / tick_s;
+    if (ticks - ticks.round()).abs() > 1e-6 || ticks < 0.5 {
+        return Err(CounterfactualError::Step { step_s, tick_s });
+    }
+    let recorded: Vec<(f64, f64)> = trace
+        .samples
+        .iter()
+        .map(|sample| (sample.time_s, sample.frequency_hz))
+        .collect();
+    let relay = recorded.iter().position(|(_, f)| *f <= RELAY_HZ);
+    let limited = Governor {
+        output_gw: [f64::NEG_INFINITY, question.governor_max_gw],
+        ..Governor::LINEAR
+    };
+    let plants = [
+        ("spec's governors", Governor::LINEAR),
+        ("limited governors", limited),
+    ]
+    .into_iter()
+    .map(|(name, governor)| {
+        let rerun = Rerun {
+            spec,
+            table,
+            governor,
+            step_s,
+        };
+        on_plant(
+            name,
+            &rerun,
+            &recorded,
+            relay,
+            ticks.round() as usize,
+            question,
+        )
+    })
+    .collect::<Result<Vec<_>, LoopError>>()?;
+    Ok(Counterfactual {
+        recorded_nadir_hz: recorded.iter().map(|p| p.1).fold(f64::INFINITY, f64::min),
+        relay_s: relay.map(|index| recorded[index].0),
+        recorded,
+        plants,
+    })
+}
+
+/// The answers on one plant.
+fn on_plant(
+    name: &'static str,
+    rerun: &Rerun<'_>,
+    recorded: &[(f64, f64)],
+    relay: Option<usize>,
+    ticks_per_sample: usize,
+    question: &Question,
+) -> Result<PlantAnswer, LoopError> {
+    let deviations: Vec<f64> = recorded.iter().map(|(_, f)| f - NOMINAL_HZ).collect();
+    let plant = GridPlant::new(rerun.spec);
+    let smoother = Smoother::fit(&plant, rerun.governor, &deviations, rerun.step_s);
+    let known = smoother.smooth(&deviations);
+    let mut history = History::default();
+    rerun.run(0.0, &known, 0.0, None, &mut history)?;
+    let misfit_hz = deviations
+        .iter()
+        .enumerate()
+        .filter_map(|(k, f)| Some((history.samples.get(k * ticks_per_sample)?.state[0] - f).abs()))
+        .fold(0.0, f64::max);
+    let mut random = Pcg64::seed_from_u64(question.seed);
+    let draws: Vec<Disturbance> = (0..question.draws)
+        .map(|_| smoother.draw(&known, &mut random))
+        .collect();
+    let reliefs = [
+        ("relays' relief as recorded", 0.0),
+        ("relays' relief taken out", question.relieved_gw),
+    ];
+    let mut variants = Vec::new();
+    for (name, put_back_gw) in reliefs {
+        let fleets = question
+            .fleets_gw
+            .iter()
+            .map(|fleet_gw| {
+                let nadir = |draw: &Disturbance| {
+                    let run = rerun.run(*fleet_gw, draw, put_back_gw, relay, &mut ())?;
+                    Ok(run.nadir_hz)
+                };
+                let nadirs = draws
+                    .par_iter()
+                    .map(nadir)
+                    .collect::<Result<Vec<f64>, LoopError>>()?;
+                Ok(FleetAnswer {
+                    fleet_gw: *fleet_gw,
+                    chargers: chargers(rerun.spec, *fleet_gw),
+                    summary: rerun.run(*fleet_gw, &known, put_back_gw, relay, &mut ())?,
+                    nadir_hz: Quantiles::of(nadirs.into_iter().map(Some)),
+                })
+            })
+            .collect::<Result<Vec<_>, LoopError>>()?;
+        variants.push(Variant {
+            name,
+            put_back_gw,
+            fleets,
+            levels: levels(rerun, &known, put_back_gw, relay)?,
+        });
+    }
+    let mut curves = Vec::new();
+    for fleet_gw in question.fleets_gw.iter() {
+        let mut history = History::default();
+        rerun.run(*fleet_gw, &known, question.relieved_gw, relay, &mut history)?;
+        let point = |s: &crate::simulation::trajectory::Sample| {
+            (s.time_s, NOMINAL_HZ + s.state[0], s.participation)
+        };
+        curves.push((*fleet_gw, history.samples.iter().map(point).collect()));
+    }
+    Ok(PlantAnswer {
+        name,
+        walk_gw: smoother.walk_gw,
+        reading_hz: smoother.reading_hz,
+        misfit_hz,
+        largest_missing_gw: known
+            .missing_gw
+            .iter()
+            .copied()
+            .fold(f64::NEG_INFINITY, f64::max),
+        variants,
+        disturbance: known,
+        curves,
+    })
+}
+
+/// Chargers of the spec's power that make up a fleet, rounded up.
+fn chargers(spec: &Spec, fleet_gw: f64) -> u64 {
+    (fleet_gw * 1e6 / spec.fleet.power_per_charger_kw).ceil() as u64
+}
+
+/// For each level the fleet from which on every larger one tried keeps the frequency above it. A scan, no bisection: more
+/// chargers are not always better under a law that switches.
+fn levels(
+    rerun: &Rerun<'_>,
+    known: &Disturbance,
+    put_back_gw: f64,
+    relay: Option<usize>,
+) -> Result<Vec<LevelAnswer>, LoopError> {
+    let tries = (FLEET_MAX_GW / FLEET_STEP_GW).round() as usize;
+    let nadirs = (0..=tries)
+        .into_par_iter()
+        .map(|index| {
+            let fleet_gw = index as f64 * FLEET_STEP_GW;
+            let run = rerun.run(fleet_gw, known, put_back_gw, relay, &mut ())?;
+            Ok((fleet_gw, run.nadir_hz))
+        })
+        .collect::<Result<Vec<_>, LoopError>>()?;
+    let answer = |level_hz: f64| {
+        let kept = nadirs
+            .iter()
+            .rev()
+            .take_while(|(_, nadir)| *nadir >= level_hz);
+        let fleet_gw = kept.last().map(|(fleet_gw, _)| *fleet_gw);
+        LevelAnswer {
+            level_hz,
+            fleet_gw,
+            chargers: fleet_gw.map(|fleet_gw| chargers(rerun.spec, fleet_gw)),
+        }
+    };
+    Ok(LEVELS_HZ.map(answer).to_vec())
+}

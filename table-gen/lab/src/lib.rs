@@ -1,0 +1,20 @@
+//! The grid to try tables on.
+//!
+//! | module | turns | into |
+//! |---|---|---|
+//! | [`simulation`] | a table, or a baseline | the grid's frequency in time |
+//! | [`fleet`] | a table | the same with one firmware for each charger |
+//! | [`replay`] | a recorded frequency | what the firmware would have done |
+//! | [`counterfactual`] | a recorded event | what it would have been with the chargers |
+//! | [`robustness`] | a temporal formula and a trace | true or false, and by how much |
+//! | [`monitor`] | a charger's telemetry | lines for a person |
+//! | [`report`] | runs and findings | one HTML page and its figures |
+#![forbid(unsafe_code)]
+
+pub mod counterfactual;
+pub mod fleet;
+pub mod monitor;
+pub mod replay;
+pub mod report;
+pub mod robustness;
+pub mod simulation;

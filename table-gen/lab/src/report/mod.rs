@@ -1,0 +1,144 @@
+//! The report: one HTML page with the figures of the paper and more, and the figures as files.
+//!
+//! | module | holds |
+//! |---|---|
+//! | [`study`] | the runs of a spec, the same as `simulate`'s |
+//! | [`section`], [`figure`] | the page as data |
+//! | [`responses`] | the event, the laws against the baseline, their robustness, Table II |
+//! | [`record`] | the recorded event: replay and counterfactual |
+//! | [`fleet`] | every charger with its own firmware |
+//! | [`limits`] | plants beyond the paper's, and what is outside the proof |
+//! | [`proof`] | verdict, budget, spec and hashes |
+//! | [`failure`] | the path that breaks a claim |
+//! | `curves`, [`palette`], [`chart`] | the drawing |
+//! | [`page`] | the page |
+
+pub mod chart;
+mod curves;
+pub mod failure;
+pub mod figure;
+pub mod fleet;
+pub mod limits;
+pub mod page;
+pub mod palette;
+pub mod proof;
+pub mod record;
+pub mod responses;
+pub mod section;
+pub mod study;
+
+use serde_json::Value;
+
+use model::spec::Spec;
+use section::Section;
+use study::{Study, StudyError};
+
+/// Why there is no report.
+#[derive(Debug, thiserror::Error)]
+pub enum ReportError {
+    /// A figure cannot be drawn.
+    #[error(transparent)]
+    Chart(#[from] chart::ChartError),
+    /// A run cannot be made.
+    #[error(transparent)]
+    Study(#[from] StudyError),
+}
+
+/// A figure as files.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct FigureFile {
+    /// Name without ending.
+    pub id: String,
+    /// The drawing, with its own style sheet.
+    pub svg: String,
+    /// What is drawn.
+    pub csv: String,
+}
+
+/// A report.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Rendered {
+    /// The page.
+    pub html: String,
+    /// Its figures in order.
+    pub figures: Vec<FigureFile>,
+}
+
+impl Rendered {
+    /// Every file of the report with its name: the page first, then each figure as SVG and CSV.
+    pub fn files(&self) -> Vec<(String, String)> {
+        let mut files = vec![("report.html".to_owned(), self.html.clone())];
+        for figure in &self.figures {
+            files.push((format!("{}.svg", figure.id), figure.svg.clone()));
+            files.push((format!("{}.csv", figure.id), figure.csv.clone()));
+        }
+        files
+    }
+}
+
+/// Results of other commands that the report shows if they are there, in their JSON form.
+#[derive(Debug, Clone, Default)]
+pub struct Findings {
+    /// Of `verify`.
+    pub verdict: Option<Value>,
+    /// Of `budget`.
+    pub budget: Option<Value>,
+}
+
+/// Runs of the robustness section unless asked otherwise.
+pub const ROBUSTNESS_RUNS: usize = 1000;
+
+/// The report of a spec and its table, with other specs beside it (such as the other direction of charging).
+///
+/// `more` are sections that the caller has made, such as a recorded event.
+///
+/// # Errors
+/// A table that cannot be run, or a figure that cannot be drawn.
+pub fn render(
+    spec: &Spec,
+    table: &[u8],
+    companions: &[(Spec, Vec<u8>)],
+    findings: &Findings,
+    more: Vec<Section>,
+) -> Result<Rendered, ReportError> {
+    let mut studies = vec![Study::new(spec, table, ROBUSTNESS_RUNS)?];
+    for (spec, table) in companions {
+        studies.push(Study::new(spec, table, ROBUSTNESS_RUNS)?);
+    }
+    render_studies(&studies, findings, more)
+}
+
+/// The report of studies, at least one; the first is the report's own spec.
+///
+/// # Errors
+/// A figure that cannot be drawn.
+pub fn render_studies(
+    studies: &[Study],
+    findings: &Findings,
+    more: Vec<Section>,
+) -> Result<Rendered, ReportError> {
+    let names: Vec<&str> = studies.iter().map(|s| s.spec.name.as_str()).collect();
+    let title = format!("Holdfast report: {}", names.join(", "));
+    let about = "Frequency response of EV chargers, from the firmware's own control loop on the bytes of its table. \
+        Every number can be had again by the command that its caption names.";
+    let mut sections = Vec::new();
+    if let Some(first) = studies.first() {
+        sections.push(responses::event(&first.spec));
+    }
+    sections.extend(studies.iter().map(responses::laws));
+    sections.push(responses::robustness(studies));
+    if let Some(first) = studies.first() {
+        sections.push(responses::table_two(&first.spec));
+    }
+    for study in studies {
+        sections.push(limits::beyond(study)?);
+    }
+    sections.extend(more);
+    sections.push(proof::verdict(findings.verdict.as_ref()));
+    if let Some(first) = studies.first() {
+        sections.extend(failure::section(findings.verdict.as_ref(), &first.spec));
+    }
+    sections.push(proof::budget(findings.budget.as_ref()));
+    sections.extend(studies.iter().map(proof::origin));
+    page::render(&title, about, &sections)
+}

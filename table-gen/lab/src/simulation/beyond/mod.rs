@@ -1,0 +1,144 @@
+//! A plant that is wrong in other ways than the spec says: for testing the controller where the model fails.
+//!
+//! Losses in stages, a second loss during recovery, inertia that is lost with the infeed, governors with a dead band, a
+//! limited rate and a limited output, and noise of the demand. None of this is linear; it exists in the simulation only,
+//! and [`Disturbances::outside_proof`] says which of it the proof does not cover.
+//!
+//! | module | holds |
+//! |---|---|
+//! | [`mod@file`] | the scenario file |
+//! | [`plant`] | the equations |
+//! | [`grid`] | the same in time, for the firmware's loop |
+
+pub mod file;
+pub mod grid;
+pub mod noise;
+pub mod plant;
+
+use model::spec::Spec;
+
+/// Lost infeed at one moment.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Loss {
+    /// When \[s after the event\].
+    pub at_s: f64,
+    /// Lost power \[GW\]; negative where power comes back.
+    pub power_gw: f64,
+    /// Inertia that goes with it \[GW s/Hz\].
+    pub inertia_gw_s_per_hz: f64,
+}
+
+/// Limits of the governors; [`Governor::LINEAR`] has none.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Governor {
+    /// Largest change of the governor's output \[GW/s\].
+    pub rate_gw_per_s: f64,
+    /// Least and greatest output \[GW\].
+    pub output_gw: [f64; 2],
+    /// Deviation to either side that the governors do not see \[Hz\].
+    pub deadband_hz: f64,
+}
+
+impl Governor {
+    /// The governor of the paper.
+    pub const LINEAR: Self = Self {
+        rate_gw_per_s: f64::INFINITY,
+        output_gw: [f64::NEG_INFINITY, f64::INFINITY],
+        deadband_hz: 0.0,
+    };
+}
+
+/// Noise of the demand: a stationary process of Ornstein and Uhlenbeck.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct DemandNoise {
+    /// Standard deviation \[GW\].
+    pub deviation_gw: f64,
+    /// Correlation time \[s\].
+    pub time_s: f64,
+}
+
+impl DemandNoise {
+    /// None.
+    pub const NONE: Self = Self {
+        deviation_gw: 0.0,
+        time_s: 1.0,
+    };
+}
+
+/// What happens to the grid, and how its plant differs from the spec's.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Disturbances {
+    /// Losses in the order of time.
+    pub losses: Vec<Loss>,
+    /// Limits of the governors.
+    pub governor: Governor,
+    /// Noise of the demand.
+    pub demand: DemandNoise,
+}
+
+impl Disturbances {
+    /// The event of the paper: one loss at time 0 on the spec's own plant.
+    pub fn step(loss_gw: f64) -> Self {
+        let loss = Loss {
+            at_s: 0.0,
+            power_gw: loss_gw,
+            inertia_gw_s_per_hz: 0.0,
+        };
+        Self {
+            losses: vec![loss],
+            governor: Governor::LINEAR,
+            demand: DemandNoise::NONE,
+        }
+    }
+
+    /// What of this the proof does not cover, one sentence each; empty if it covers all.
+    pub fn outside_proof(&self, spec: &Spec) -> Vec<String> {
+        let mut out = Vec::new();
+        let [low, high] = spec.uncertainty.loss_gw;
+        let mut lost = 0.0;
+        for loss in &self.losses {
+            lost += loss.power_gw;
+            if !(low..=high).contains(&lost) {
+                out.push(format!(
+                    "from {} s on {lost:.3} GW are lost; the spec's band is {low} to {high} GW",
+                    loss.at_s
+                ));
+            }
+        }
+        if self.losses.first().is_none_or(|loss| loss.at_s > 0.0) {
+            out.push("nothing is lost at first; the proof begins with the loss".to_owned());
+        }
+        let inertia: f64 = self.losses.iter().map(|l| l.inertia_gw_s_per_hz).sum();
+        if inertia != 0.0 {
+            out.push(format!(
+                "{inertia:.3} GW s/Hz of inertia are lost with the infeed"
+            ));
+        }
+        let governor = &self.governor;
+        if governor.deadband_hz > 0.0 {
+            out.push(format!(
+                "the governors have a dead band of {} Hz",
+                governor.deadband_hz
+            ));
+        }
+        if governor.rate_gw_per_s.is_finite() {
+            out.push(format!(
+                "the governors' output moves by at most {} GW/s",
+                governor.rate_gw_per_s
+            ));
+        }
+        if governor.output_gw.iter().any(|limit| limit.is_finite()) {
+            let [low, high] = governor.output_gw;
+            out.push(format!(
+                "the governors' output stays within {low} to {high} GW"
+            ));
+        }
+        if self.demand.deviation_gw > 0.0 {
+            out.push(format!(
+                "the demand varies by {} GW (standard deviation)",
+                self.demand.deviation_gw
+            ));
+        }
+        out
+    }
+}

@@ -1,0 +1,19 @@
+//! What every host package of Holdfast starts from: the specification, the plant, and rigorous arithmetic.
+//!
+//! | module | turns | into |
+//! |---|---|---|
+//! | [`spec`] | a TOML document | checked numbers |
+//! | [`logic`] | a temporal formula | requirements |
+//! | [`plant`] | parameters | the equations, once, for plain numbers and intervals |
+//! | [`propagator`] | the equations | the exact step in plain numbers |
+//! | [`interval`], [`flow`] | the equations | enclosures of the flow over a time |
+//! | [`grid_shape`] | a grid of cells | cell numbers |
+#![forbid(unsafe_code)]
+
+pub mod flow;
+pub mod grid_shape;
+pub mod interval;
+pub mod logic;
+pub mod plant;
+pub mod propagator;
+pub mod spec;

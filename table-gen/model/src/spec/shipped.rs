@@ -1,0 +1,38 @@
+//! The specs that are part of the program, by name.
+
+/// Name and text of each shipped spec.
+pub(super) const SHIPPED: &[(&str, &str)] = &[
+    ("paper-bi", include_str!("../../../specs/paper-bi.toml")),
+    ("paper-uni", include_str!("../../../specs/paper-uni.toml")),
+    ("gb-bi", include_str!("../../../specs/gb-bi.toml")),
+    (
+        "gb-bi-delay",
+        include_str!("../../../specs/gb-bi-delay.toml"),
+    ),
+    ("gb-uni", include_str!("../../../specs/gb-uni.toml")),
+    (
+        "gb-bi-normal",
+        include_str!("../../../specs/gb-bi-normal.toml"),
+    ),
+];
+
+/// Names of the shipped specs, in the order of [`SHIPPED`].
+pub(super) const NAMES: &[&str] = &names();
+
+/// The text of a shipped spec.
+pub(super) fn text(name: &str) -> Option<&'static str> {
+    SHIPPED
+        .iter()
+        .find(|(shipped, _)| *shipped == name)
+        .map(|(_, text)| *text)
+}
+
+const fn names() -> [&'static str; SHIPPED.len()] {
+    let mut names = [""; SHIPPED.len()];
+    let mut i = 0;
+    while i < names.len() {
+        names[i] = SHIPPED[i].0;
+        i += 1;
+    }
+    names
+}

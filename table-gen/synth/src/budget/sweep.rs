@@ -1,0 +1,226 @@
+//! Guarantee against bytes: variants of a spec, each synthesised and compressed, and which of them nothing beats.
+
+use plotters::prelude::*;
+use serde::Serialize;
+
+use crate::compress::{self, CompressError, Options};
+use crate::game::{GameError, Watch};
+use crate::synthesis::{self, SynthesisError};
+use model::spec::Spec;
+
+/// A variant of a spec.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Variant {
+    /// Factor on every cell width.
+    pub width_factor: f64,
+    /// Period \[s\].
+    pub period_s: f64,
+    /// Relative error of participation.
+    pub participation: f64,
+}
+
+/// How a variant came out.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Outcome {
+    /// The variant.
+    #[serde(flatten)]
+    pub variant: Variant,
+    /// Bytes of the table; absent where there is none.
+    pub table_bytes: Option<usize>,
+    /// Worst-case time from outside I1 into I2 \[s\]: steps of C1 and C2.
+    pub settle_s: Option<f64>,
+    /// Winning cells of C1.
+    pub winning_cells: Option<usize>,
+    /// Why there is no table.
+    pub reason: Option<String>,
+    /// Whether no variant with at least this participation error is both smaller and faster.
+    pub pareto: bool,
+}
+
+/// The spec of a variant.
+fn spec_of(spec: &Spec, variant: &Variant) -> Spec {
+    let mut spec = spec.clone();
+    for width in &mut spec.grid.width {
+        *width *= variant.width_factor;
+    }
+    spec.sampling.period_s = variant.period_s;
+    spec.uncertainty.participation = variant.participation;
+    spec
+}
+
+/// Synthesises and compresses a variant. What makes a variant impossible is part of its outcome.
+///
+/// # Errors
+/// An interruption.
+pub fn try_variant<'w>(
+    spec: &Spec,
+    variant: Variant,
+    options: &Options,
+    watch: &dyn Fn(&'static str) -> Box<dyn Watch + 'w>,
+) -> Result<Outcome, GameError> {
+    let mut outcome = Outcome {
+        variant,
+        table_bytes: None,
+        settle_s: None,
+        winning_cells: None,
+        reason: None,
+        pareto: false,
+    };
+    let spec = spec_of(spec, &variant);
+    let synthesis = match synthesis::synthesise(&spec, watch) {
+        Ok(synthesis) => synthesis,
+        Err(SynthesisError::Game {
+            error: GameError::Interrupted,
+            ..
+        }) => return Err(GameError::Interrupted),
+        Err(error) => {
+            outcome.reason = Some(error.to_string());
+            return Ok(outcome);
+        }
+    };
+    outcome.winning_cells = Some(synthesis.c1.solution.winning);
+    match compress::table(&spec, &synthesis, options, watch) {
+        Ok((bytes, laws)) => {
+            let steps: u32 = laws
+                .laws
+                .iter()
+                .map(|law| u32::from(law.report.steps))
+                .sum();
+            outcome.table_bytes = Some(bytes.len());
+            outcome.settle_s = Some(f64::from(steps) * variant.period_s);
+        }
+        Err(CompressError::Game(GameError::Interrupted)) => return Err(GameError::Interrupted),
+        Err(error) => outcome.reason = Some(error.to_string()),
+    }
+    Ok(outcome)
+}
+
+/// Marks the outcomes that no other beats: one that bears at least as much participation error, is no larger and no
+/// slower, and better in one of the three.
+pub fn mark_pareto(outcomes: &mut [Outcome]) {
+    let keys: Vec<Option<(f64, usize, f64)>> = outcomes
+        .iter()
+        .map(|o| Some((o.variant.participation, o.table_bytes?, o.settle_s?)))
+        .collect();
+    for (outcome, key) in outcomes.iter_mut().zip(&keys) {
+        let Some(mine) = key else { continue };
+        outcome.pareto = !keys.iter().flatten().any(|other| {
+            other.0 >= mine.0 && other.1 <= mine.1 && other.2 <= mine.2 && other != mine
+        });
+    }
+}
+
+/// Size of the picture \[px\].
+const SIZE: (u32, u32) = (720, 440);
+
+/// Bytes (logarithmic) against settling time as an SVG, every point with its variant; the front is filled.
+///
+/// # Errors
+/// What the drawing library could not draw.
+pub fn svg(outcomes: &[Outcome]) -> Result<String, String> {
+    let mut text = String::new();
+    draw(outcomes, &mut text).map_err(|error| error.to_string())?;
+    Ok(text)
+}
+
+fn draw(outcomes: &[Outcome], text: &mut String) -> Result<(), Box<dyn std::error::Error>> {
+    let points: Vec<(f64, f64, &Outcome)> = outcomes
+        .iter()
+        .filter_map(|o| Some((o.table_bytes? as f64, o.settle_s?, o)))
+        .collect();
+    let ends = |values: &dyn Fn(&(f64, f64, &Outcome)) -> f64, empty: (f64, f64)| {
+        let found = points.iter().map(values);
+        let bounds = (f64::INFINITY, f64::NEG_INFINITY);
+        match found.fold(bounds, |(a, b), x| (a.min(x), b.max(x))) {
+            (least, most) if least <= most => (least, most),
+            _ => empty,
+        }
+    };
+    let (fewest, most) = ends(&|point| point.0, (100.0, 1000.0));
+    let (soonest, latest) = ends(&|point| point.1, (0.0, 60.0));
+    // Whole decades: only those carry a label.
+    let decade = |power: f64| 10f64.powf(power);
+    let room = (0.1 * (latest - soonest)).max(0.5);
+    let root = SVGBackend::with_string(text, SIZE).into_drawing_area();
+    root.fill(&WHITE)?;
+    let mut chart = ChartBuilder::on(&root)
+        .margin(12)
+        .x_label_area_size(44)
+        .y_label_area_size(56)
+        .build_cartesian_2d(
+            (decade(fewest.log10().floor())..decade((most * 1.01).log10().ceil())).log_scale(),
+            soonest - room..latest + room,
+        )?;
+    chart
+        .configure_mesh()
+        .max_light_lines(1)
+        .x_desc("table [bytes]; filled: nothing is smaller, faster and bears more")
+        .y_desc("worst time to I2 [s]")
+        .x_label_formatter(&|bytes| format!("{bytes:.0}"))
+        .draw()?;
+    let blue = RGBColor(0x1f, 0x5f, 0xa8);
+    chart.draw_series(points.iter().map(|(bytes, settle_s, outcome)| {
+        let style = ShapeStyle {
+            color: blue.to_rgba(),
+            filled: outcome.pareto,
+            stroke_width: 1,
+        };
+        Circle::new((*bytes, *settle_s), 5, style)
+    }))?;
+    chart.draw_series(points.iter().map(|(bytes, settle_s, outcome)| {
+        let Variant {
+            width_factor,
+            period_s,
+            participation,
+        } = outcome.variant;
+        let label = format!(
+            "x{width_factor}, {period_s} s, ±{:.0} %",
+            100.0 * participation
+        );
+        EmptyElement::at((*bytes, *settle_s)) + Text::new(label, (8, -14), ("sans-serif", 13))
+    }))?;
+    root.present()?;
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn outcome(participation: f64, bytes: usize, settle_s: f64) -> Outcome {
+        Outcome {
+            variant: Variant {
+                width_factor: 1.0,
+                period_s: 1.0,
+                participation,
+            },
+            table_bytes: Some(bytes),
+            settle_s: Some(settle_s),
+            winning_cells: None,
+            reason: None,
+            pareto: false,
+        }
+    }
+
+    #[test]
+    fn the_front_holds_what_nothing_beats() {
+        let mut outcomes = [
+            outcome(0.0, 100, 20.0),
+            outcome(0.0, 200, 10.0),
+            outcome(0.0, 200, 20.0),
+            outcome(0.1, 300, 30.0),
+        ];
+        mark_pareto(&mut outcomes);
+        assert_eq!(outcomes.map(|o| o.pareto), [true, true, false, true]);
+    }
+
+    #[test]
+    fn the_picture_names_every_variant_that_has_a_table() {
+        let mut outcomes = [outcome(0.0, 2000, 20.0), outcome(0.1, 9000, 30.0)];
+        mark_pareto(&mut outcomes);
+        let picture = svg(&outcomes).unwrap();
+        assert_eq!(picture.matches("<circle").count(), 2);
+        assert!(picture.contains("x1, 1 s, ±0 %") && picture.contains("x1, 1 s, ±10 %"));
+        assert!(svg(&[]).unwrap().contains("worst time to I2"));
+    }
+}

@@ -1,0 +1,119 @@
+//! Which affine laws a tree's leaves may name, and the labels that this gives a cell.
+
+use firmware::grid::Cell;
+use firmware::table::{AffineFunction, LEAF_AFFINE};
+use rayon::prelude::*;
+
+use super::cells::LabelledCell;
+use super::tree::Tree;
+use model::plant::STATES;
+
+/// Most laws in a set: what a label set has room for is 32; each costs 12 bytes.
+const LAWS_MAX: usize = 8;
+/// A further law must fit at least one of this many cells that no law before it fits.
+const WORTH_ONE_IN: usize = 500;
+/// Cells that a choice of laws looks at; more are sampled.
+const SAMPLE_CELLS: usize = 200_000;
+
+/// Affine laws and the number of input levels.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct LawSet {
+    /// The laws; leaf 32 + k names the k-th.
+    pub laws: Vec<AffineFunction>,
+    /// Input levels.
+    pub levels: u8,
+}
+
+impl LawSet {
+    /// Leaf values that give a cell an allowed input (bit u of `allowed` for level u).
+    pub fn labels(&self, cell: [u16; STATES], allowed: u32) -> u64 {
+        let mut labels = u64::from(allowed);
+        for (k, law) in self.laws.iter().enumerate() {
+            let fits = u64::from(allowed >> law.level(Cell(cell), self.levels) & 1);
+            labels |= fits << (usize::from(LEAF_AFFINE) + k);
+        }
+        labels
+    }
+
+    /// Level that a leaf value gives a cell.
+    pub fn level(&self, leaf: u8, cell: [u16; STATES]) -> u8 {
+        match leaf.checked_sub(LEAF_AFFINE) {
+            None => leaf,
+            Some(law) => self
+                .laws
+                .get(usize::from(law))
+                .map_or(0, |law| law.level(Cell(cell), self.levels)),
+        }
+    }
+
+    /// The leaf that a box gets of those in common: the earliest law, else the level nearest to what the first law says
+    /// on average there, so that neighbouring boxes differ little.
+    pub fn choose(&self, common: u64, cells: &[LabelledCell]) -> u8 {
+        let laws = common >> LEAF_AFFINE;
+        if laws != 0 {
+            return LEAF_AFFINE + laws.trailing_zeros() as u8;
+        }
+        let Some(first) = self.laws.first() else {
+            return common.trailing_zeros() as u8;
+        };
+        let sum: u64 = cells
+            .iter()
+            .map(|cell| u64::from(first.level(cell.cell(), self.levels)))
+            .sum();
+        let mean = (sum / cells.len().max(1) as u64) as u8;
+        (0..LEAF_AFFINE)
+            .filter(|level| common >> level & 1 == 1)
+            .min_by_key(|level| level.abs_diff(mean))
+            .unwrap_or(0)
+    }
+
+    /// The set without the laws that a tree does not name, and the tree with its leaves renumbered.
+    pub fn used(&self, tree: &Tree) -> (Self, Tree) {
+        let named = tree.values();
+        let mut renumbered = [0u8; 64];
+        let mut laws = Vec::new();
+        for value in 0..64u8 {
+            let law = value.checked_sub(LEAF_AFFINE).map(usize::from);
+            renumbered[usize::from(value)] = match law.and_then(|k| self.laws.get(k)) {
+                Some(law) if named >> value & 1 == 1 => {
+                    laws.push(*law);
+                    LEAF_AFFINE + laws.len() as u8 - 1
+                }
+                _ => value,
+            };
+        }
+        let levels = self.levels;
+        (Self { laws, levels }, tree.renumbered(&renumbered))
+    }
+}
+
+/// Chooses laws from candidates: each in turn the one that fits the most cells (by index and allowed inputs) that no
+/// earlier law fits. The first is always chosen, the others while they are worth their bytes.
+pub fn choose_laws(
+    candidates: &[AffineFunction],
+    levels: u8,
+    cells: &[([u16; STATES], u32)],
+) -> LawSet {
+    let every = cells.len().div_ceil(SAMPLE_CELLS).max(1);
+    let mut open: Vec<_> = cells.iter().step_by(every).copied().collect();
+    let worth = open.len() / WORTH_ONE_IN;
+    let fits = |law: &AffineFunction, (cell, allowed): &([u16; STATES], u32)| {
+        allowed >> law.level(Cell(*cell), levels) & 1 == 1
+    };
+    let mut laws: Vec<AffineFunction> = Vec::new();
+    while laws.len() < LAWS_MAX {
+        let counts: Vec<usize> = candidates
+            .par_iter()
+            .map(|law| open.iter().filter(|cell| fits(law, cell)).count())
+            .collect();
+        // Of equals the first candidate.
+        let best = counts.iter().enumerate().rev().max_by_key(|(_, n)| **n);
+        let Some((at, count)) = best else { break };
+        if !laws.is_empty() && *count <= worth {
+            break;
+        }
+        laws.push(candidates[at]);
+        open.retain(|cell| !fits(&candidates[at], cell));
+    }
+    LawSet { laws, levels }
+}

@@ -1,0 +1,66 @@
+//! Which cells does the closed loop ask the table for?
+//!
+//! The answer only chooses what a table covers. It is not part of the proof: a cell that the device asks for and that was
+//! left out is answered by "outside", and the verifier reports it. So plain arithmetic will do here.
+//!
+//! | the event | explored as |
+//! |---|---|
+//! | exactly known: one loss, one initial state, no errors | [`segments`]: the states that the unknown moment of the event within a tick makes possible, tick by tick through the firmware's own phase machine |
+//! | uncertain, with `stay` | [`whole_cells`]: from the cells of the trigger, cell by cell through the abstraction; the games were won on those very cells |
+//!
+//! An uncertain event without `stay` has no bound: in Fixed there is no game, and whole cells there spread over
+//! everything.
+
+pub mod segments;
+pub mod whole_cells;
+
+use firmware::table::{LAWS, TableView};
+
+use super::CompressError;
+use crate::abstraction::affine::AffineAbstraction;
+use crate::game::bitset::BitSet;
+use model::plant::STATES;
+use model::spec::Spec;
+
+/// What the closed loop asks for.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Asked {
+    /// Cells for which it asks each law, in the order of the directory.
+    pub laws: [BitSet; LAWS],
+    /// Whether the union of these cells is closed under the abstraction: then any allowed input whose box stays in it
+    /// will do, and not only the explored one.
+    pub closed: bool,
+}
+
+/// Cells for which the closed loop asks each law.
+///
+/// # Errors
+/// A spec whose closed loop cannot be explored, or a loop that leaves the table.
+pub fn reachable(
+    spec: &Spec,
+    abstraction: &AffineAbstraction<STATES>,
+    table: &TableView<'_>,
+) -> Result<Asked, CompressError> {
+    if exactly_known(spec) {
+        let laws = segments::explore(spec, table)?;
+        return Ok(Asked {
+            laws,
+            closed: false,
+        });
+    }
+    if spec.requirements.stay {
+        let laws = whole_cells::explore(spec, abstraction, table)?;
+        return Ok(Asked { laws, closed: true });
+    }
+    Err(CompressError::Unbounded)
+}
+
+/// Whether nothing about the event is uncertain but its moment within a tick.
+fn exactly_known(spec: &Spec) -> bool {
+    let uncertainty = &spec.uncertainty;
+    uncertainty.loss_gw[0] == uncertainty.loss_gw[1]
+        && uncertainty.participation == 0.0
+        && uncertainty.measurement == [0.0; STATES]
+        && uncertainty.actuation_delay_s == 0.0
+        && uncertainty.initial.lower == uncertainty.initial.upper
+}

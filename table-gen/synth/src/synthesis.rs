@@ -1,0 +1,421 @@
+//! From a spec to its laws: which games are played on which cells.
+//!
+//! | law | game | target | in the spec |
+//! |---|---|---|---|
+//! | C1 | reach-avoid | whole cells in I1 | always |
+//! | C2 | reach-avoid | whole cells in I2 | if I2 is smaller than I1 |
+//! | Hold | safety | stay in whole cells in I2 | `stay = true`; then C2, or C1 if there is no C2, reaches Hold's kernel |
+//!
+//! "Avoid" is every cell of which any part lies below containment. With a measurement error e, the cell is that of the
+//! estimate: the real frequency may lie e outside it, so bands shrink and containment rises by e. Where commands act with a delay,
+//! the cell is that of the prediction ([`crate::delay`]), and e that of the prediction.
+//!
+//! All numbers of the abstraction are in the device's micro-units, so that the edges of the cells are exact.
+
+use std::time::Instant;
+
+use firmware::grid::{Grid, GridError};
+use firmware::units::AXIS_F;
+
+use crate::abstraction::Abstraction;
+use crate::abstraction::affine::{AbstractionError, AffineAbstraction, AffineInput, Growth};
+use crate::abstraction::tube::TubeGuard;
+use crate::delay::{Delay, DelayError, known_within};
+use crate::game::bitset::BitSet;
+use crate::game::guard::Guard;
+use crate::game::reach::{may_reach, reach};
+use crate::game::{GameError, LastCells, Solution, Watch, safety::safety};
+use crate::usage;
+use model::grid_shape::GridShape;
+use model::interval::Interval;
+use model::plant::{GridPlant, STATES};
+use model::spec::{Spec, Successor};
+
+/// Micro-units in a unit.
+pub const MICRO: f64 = firmware::units::MICRO as f64;
+
+/// A law's game, solved.
+#[derive(Debug, Clone)]
+pub struct SolvedLaw {
+    /// Allowed inputs and ranks.
+    pub solution: Solution,
+    /// Target cells (the kernel itself for Hold).
+    pub target_cells: usize,
+    /// Processor time of the game \[s\].
+    pub cpu_s: f64,
+    /// Wall time of the game \[s\].
+    pub wall_s: f64,
+}
+
+/// All laws of a spec.
+#[derive(Debug, Clone)]
+pub struct Synthesis {
+    /// The device's grid.
+    pub grid: Grid,
+    /// Reaches I1.
+    pub c1: SolvedLaw,
+    /// Reaches I2; absent if I1 = I2.
+    pub c2: Option<SolvedLaw>,
+    /// Stays in I2; absent without `stay`.
+    pub hold: Option<SolvedLaw>,
+    /// Processor time of the abstraction's tables \[s\].
+    pub abstraction_cpu_s: f64,
+}
+
+/// Why there are no laws.
+#[derive(Debug, thiserror::Error)]
+pub enum SynthesisError {
+    /// A delay that the device cannot predict over.
+    #[error(transparent)]
+    Delay(#[from] DelayError),
+    /// The spec's grid is not one for the device.
+    #[error("the grid does not fit the device: {0:?}")]
+    Grid(GridError),
+    /// The abstraction cannot be built.
+    #[error(transparent)]
+    Abstraction(#[from] AbstractionError),
+    /// A game has no result.
+    #[error("{game}: {error}")]
+    Game {
+        /// The law whose game it is.
+        game: &'static str,
+        /// Why.
+        error: GameError,
+    },
+    /// A game has an empty answer: no controller exists on this grid.
+    #[error("{game}: no controller exists on this grid: {reason}")]
+    NoController {
+        /// The law whose game it is.
+        game: &'static str,
+        /// Which requirement fails, and how close it came.
+        reason: String,
+    },
+}
+
+/// The device's grid of a spec.
+///
+/// # Errors
+/// As [`Grid::new`].
+pub fn device_grid(spec: &Spec) -> Result<Grid, GridError> {
+    // Counts above 65535 were refused by the spec.
+    let count = spec.grid.cell_counts().map(|n| n as u16);
+    Grid::new(
+        spec.grid.lower_edges_micro(),
+        spec.grid.widths_micro(),
+        count,
+    )
+}
+
+/// The engine's view of the device's grid, in micro-units.
+pub fn grid_shape(grid: &Grid) -> GridShape<STATES> {
+    GridShape {
+        lower: grid.lower_edge().map(f64::from),
+        width: grid.width().map(f64::from),
+        count: grid.count().map(u32::from),
+    }
+}
+
+/// Net power `P u' - w` \[µGW\] under a commanded participation: u' within the participation error, at most the whole
+/// fleet, and w within its band.
+pub fn net_power(spec: &Spec, level: usize) -> Interval {
+    let fleet = Interval::point(spec.fleet_power_gw()) * Interval::point(MICRO);
+    let u = Interval::point(spec.input.value(level));
+    let error = Interval::point(spec.uncertainty.participation);
+    let low = (u * (Interval::ONE - error)).low.max(0.0);
+    let high = (u * (Interval::ONE + error)).high.min(1.0);
+    let [loss_low, loss_high] = spec.uncertainty.loss_gw;
+    let loss = Interval::hull(loss_low, loss_high) * Interval::point(MICRO);
+    fleet * Interval::hull(low, high) - loss
+}
+
+/// Bound of the estimate's error \[micro-units\], rounded up.
+pub fn measurement_micro(spec: &Spec) -> [f64; STATES] {
+    spec.uncertainty
+        .measurement
+        .map(|e| if e == 0.0 { 0.0 } else { (e * MICRO).next_up() })
+}
+
+/// The inputs of a spec as drives of its plant.
+fn inputs(spec: &Spec) -> Vec<AffineInput<STATES>> {
+    let (a, b) = GridPlant::new(spec).matrices();
+    (0..spec.input.levels())
+        .map(|level| AffineInput {
+            a,
+            b,
+            drive: net_power(spec, level),
+        })
+        .collect()
+}
+
+/// The period \[s\], a whole number of milliseconds.
+pub fn period_s(spec: &Spec) -> f64 {
+    f64::from(spec.sampling.period_ms()) / 1000.0
+}
+
+/// The abstraction of a spec's plant on its grid.
+///
+/// # Errors
+/// As [`AffineAbstraction::new`], and a delay that the device cannot predict over.
+pub fn abstraction(spec: &Spec, grid: &Grid) -> Result<AffineAbstraction<STATES>, SynthesisError> {
+    let growth = match spec.method.successor {
+        Successor::GrowthBound => Growth::GrowthBound,
+        Successor::ExactLinear => Growth::ExactLinear,
+    };
+    let (shape, inputs, period_s) = (grid_shape(grid), inputs(spec), period_s(spec));
+    let Some(delay) = Delay::of(spec)? else {
+        let measurement = measurement_micro(spec);
+        return Ok(AffineAbstraction::new(
+            shape,
+            &inputs,
+            period_s,
+            growth,
+            measurement,
+        )?);
+    };
+    let drifts = Some(&delay.drifts[..]);
+    let errors = delay.errors;
+    Ok(AffineAbstraction::with_drifts(
+        shape, &inputs, period_s, growth, errors, drifts,
+    )?)
+}
+
+/// The guard of a band \[µHz\], if the spec asks for the time between the samples and the band has an end.
+fn between_samples(
+    spec: &Spec,
+    grid: &Grid,
+    (low, high): (f64, f64),
+) -> Result<OptionalGuard, DelayError> {
+    let bounded = low.is_finite() || high.is_finite();
+    if !(spec.method.between_samples && bounded) {
+        return Ok(OptionalGuard(None));
+    }
+    Ok(OptionalGuard(Some(TubeGuard::new(
+        &grid_shape(grid),
+        &inputs(spec),
+        period_s(spec),
+        known_within(spec)?,
+        AXIS_F,
+        (low, high),
+    ))))
+}
+
+/// The guard of C1 and C2: f stays above containment between the samples too, if the spec asks for it.
+///
+/// # Errors
+/// A delay that the device cannot predict over.
+pub fn containment_guard(spec: &Spec, grid: &Grid) -> Result<OptionalGuard, DelayError> {
+    let low = spec.requirements.containment_hz.map(containment_micro);
+    between_samples(
+        spec,
+        grid,
+        (low.unwrap_or(f64::NEG_INFINITY), f64::INFINITY),
+    )
+}
+
+/// The guard of Hold: f stays in I2 between the samples too, if the spec asks for it.
+///
+/// # Errors
+/// A delay that the device cannot predict over.
+pub fn stay_guard(spec: &Spec, grid: &Grid) -> Result<OptionalGuard, DelayError> {
+    let [low, high] = spec.requirements.inner_micro().map(f64::from);
+    between_samples(spec, grid, (low, high))
+}
+
+/// A guard, or none.
+#[derive(Debug, Clone)]
+pub struct OptionalGuard(Option<TubeGuard<STATES>>);
+
+impl Guard<STATES> for OptionalGuard {
+    fn permitted(&self, cell: [u32; STATES], inputs: u32) -> u32 {
+        match &self.0 {
+            None => inputs,
+            Some(guard) => guard.permitted(cell, inputs),
+        }
+    }
+}
+
+/// Containment \[µHz\], rounded up if it is no whole number of them.
+fn containment_micro(hz: f64) -> f64 {
+    let micro = hz * MICRO;
+    // The product of a decimal and 1e6 may miss a whole number by a rounding; a thousandth of a µHz decides.
+    if (micro - micro.round()).abs() < 1e-3 {
+        micro.round()
+    } else {
+        micro.ceil()
+    }
+}
+
+/// Cells whose whole frequency interval, widened by the measurement error, lies in a band \[µHz\].
+fn cells_within(grid: &Grid, low: f64, high: f64, error: f64) -> BitSet {
+    by_frequency(grid, |cell_low, cell_high| {
+        cell_low - error >= low && cell_high + error <= high
+    })
+}
+
+/// Cells chosen by their frequency interval \[µHz\].
+fn by_frequency(grid: &Grid, choose: impl Fn(f64, f64) -> bool) -> BitSet {
+    let shape = grid_shape(grid);
+    let row: Vec<bool> = (0..shape.count[0])
+        .map(|f| {
+            let (low, high) = shape.interval(0, f);
+            choose(low, high)
+        })
+        .collect();
+    let mut set = BitSet::new(shape.cells());
+    for index in 0..shape.cells() {
+        if row[index % row.len()] {
+            set.insert(index);
+        }
+    }
+    set
+}
+
+/// Plays the games of a spec. `watch` is asked for an observer of each game by its name.
+///
+/// # Errors
+/// A grid or abstraction that cannot be, an empty target, an empty kernel or winning set, or an interruption.
+pub fn synthesise<'w>(
+    spec: &Spec,
+    watch: &dyn Fn(&'static str) -> Box<dyn Watch + 'w>,
+) -> Result<Synthesis, SynthesisError> {
+    let grid = device_grid(spec).map_err(SynthesisError::Grid)?;
+    let before = usage::cpu_s();
+    let abstraction = abstraction(spec, &grid)?;
+    let requirements = &spec.requirements;
+    let containment = requirements.containment_hz.map(containment_micro);
+    let contained = containment_guard(spec, &grid)?;
+    let abstraction_cpu_s = usage::cpu_s() - before;
+    let error = known_within(spec)?[AXIS_F];
+    let [outer_low, outer_high] = requirements.outer_micro().map(f64::from);
+    let [inner_low, inner_high] = requirements.inner_micro().map(f64::from);
+    let outer = cells_within(&grid, outer_low, outer_high, error);
+    let inner = cells_within(&grid, inner_low, inner_high, error);
+    let avoid = match containment {
+        None => BitSet::new(outer.len()),
+        // A cell counts as contained only if its lower end, less the error, is at or above the limit.
+        Some(limit) => by_frequency(&grid, |low, _| low - error < limit),
+    };
+    let hold = if requirements.stay {
+        let stay = stay_guard(spec, &grid)?;
+        let mut last = 0;
+        let law = solve("Hold", watch, |watch| {
+            let watch = LastCells::new(watch);
+            let solution = safety(&abstraction, &inner, &stay, &watch);
+            last = watch.last();
+            solution
+        })?;
+        if law.solution.winning == 0 {
+            // The last sweep only finds that nothing is left.
+            let periods = law.solution.sweeps.saturating_sub(2);
+            let closest = match last {
+                0 => "none has an input that keeps f there between the samples".to_owned(),
+                _ => format!("{last} came closest, with {periods} periods"),
+            };
+            return Err(SynthesisError::NoController {
+                game: "Hold",
+                reason: format!(
+                    "requirements.stay fails: of the {} cells in I2 none can stay there for ever; {closest}",
+                    inner.count(),
+                ),
+            });
+        }
+        Some(law)
+    } else {
+        None
+    };
+    let kernel = hold.as_ref().map(|law| law.solution.winning_set(true));
+    let same = requirements.outer_micro() == requirements.inner_micro();
+    let play = |name, target: &BitSet| {
+        let law = solve(name, watch, |watch| {
+            reach(&abstraction, target, &avoid, &contained, watch)
+        })?;
+        if law.solution.winning == 0 {
+            return Err(SynthesisError::NoController {
+                game: name,
+                reason: format!(
+                    "{} fails: no cell outside the target's {} can be driven into it for certain; {} cells came closest, \
+                     with an input that may do so",
+                    goal(name, &kernel),
+                    law.target_cells,
+                    may_reach(&abstraction, target, &avoid),
+                ),
+            });
+        }
+        Ok(law)
+    };
+    let c2 = match (same, &kernel) {
+        (true, _) => None,
+        (false, Some(kernel)) => Some(play("C2", kernel)?),
+        (false, None) => Some(play("C2", &inner)?),
+    };
+    let c1_target = match (&kernel, &c2) {
+        (None, _) => outer,
+        (Some(kernel), None) => kernel.clone(),
+        (Some(_), Some(c2)) => {
+            // C1 hands over where C2 (or Hold) has an entry and f is in I1.
+            let mut target = c2.solution.winning_set(true);
+            for index in 0..target.len() {
+                if !outer.contains(index) {
+                    target.remove(index);
+                }
+            }
+            target
+        }
+    };
+    let c1 = play("C1", &c1_target)?;
+    Ok(Synthesis {
+        grid,
+        c1,
+        c2,
+        hold,
+        abstraction_cpu_s,
+    })
+}
+
+/// The requirement that a reach game is for, by its key.
+fn goal(game: &str, kernel: &Option<BitSet>) -> &'static str {
+    match (game, kernel) {
+        ("C2", None) => "requirements.inner_hz",
+        ("C2", Some(_)) => "requirements.inner_hz with stay",
+        (_, None) => "requirements.outer_hz",
+        (_, Some(_)) => "requirements.outer_hz with stay",
+    }
+}
+
+fn solve<'w>(
+    game: &'static str,
+    watch: &dyn Fn(&'static str) -> Box<dyn Watch + 'w>,
+    play: impl FnOnce(&dyn Watch) -> Result<Solution, GameError>,
+) -> Result<SolvedLaw, SynthesisError> {
+    let (cpu, wall) = (usage::cpu_s(), Instant::now());
+    let watch = watch(game);
+    let solution = play(watch.as_ref()).map_err(|error| SynthesisError::Game { game, error })?;
+    let target_cells = solution.ranks.iter().filter(|rank| **rank == 0).count();
+    Ok(SolvedLaw {
+        solution,
+        target_cells,
+        cpu_s: usage::cpu_s() - cpu,
+        wall_s: wall.elapsed().as_secs_f64(),
+    })
+}
+
+/// Transitions of the abstraction: cells in the boxes of all allowed pairs. A count for comparison with tools that store
+/// them; nothing else needs it.
+pub fn count_transitions<const D: usize, A: Abstraction<D>>(abstraction: &A) -> u64 {
+    use rayon::prelude::*;
+    let shape = abstraction.shape();
+    (0..shape.cells())
+        .into_par_iter()
+        .map(|index| {
+            let anchor = abstraction.anchor(shape.cell(index));
+            (0..abstraction.inputs())
+                .filter_map(|input| abstraction.successor(&anchor, input))
+                .map(|cells| {
+                    (0..D)
+                        .map(|d| u64::from(cells.high[d] - cells.low[d] + 1))
+                        .product::<u64>()
+                })
+                .sum::<u64>()
+        })
+        .sum()
+}

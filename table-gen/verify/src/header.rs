@@ -1,0 +1,88 @@
+//! Whether the table's header says what the spec says.
+//!
+//! The proof takes the firmware's behaviour from the header, whatever it says; this claim is that the header is the one
+//! that this spec asks for: another grid, clock, band or plant means a table for another purpose, even where it happens
+//! to meet the requirements.
+
+use firmware::table::Header;
+
+use model::spec::Spec;
+
+/// The header's fields that differ from the spec; empty if they agree.
+pub(super) fn differences(header: &Header, spec: &Spec) -> Vec<String> {
+    let mut out = Vec::new();
+    let mut same = |what: &str, found: String, expected: String| {
+        if found != expected {
+            out.push(format!("{what} is {found}, the spec says {expected}"));
+        }
+    };
+    let grid = &header.grid;
+    let counts = spec.grid.cell_counts();
+    same(
+        "the grid's lower edge",
+        format!("{:?}", grid.lower_edge()),
+        format!("{:?}", spec.grid.lower_edges_micro()),
+    );
+    same(
+        "the cell width",
+        format!("{:?}", grid.width()),
+        format!("{:?}", spec.grid.widths_micro()),
+    );
+    same(
+        "the grid's cells",
+        format!("{:?}", grid.count()),
+        format!("{counts:?}"),
+    );
+    let levels = spec.input.levels();
+    same(
+        "the number of inputs",
+        header.levels.to_string(),
+        levels.to_string(),
+    );
+    let last = header.levels.saturating_sub(1);
+    same(
+        "the last input [ppm]",
+        header.participation(last).ppm().to_string(),
+        // Steps such as 1/3 are stored as a whole number of ppm, rounded down.
+        (u64::from(header.input_step_ppm) * (levels as u64 - 1)).to_string(),
+    );
+    let step = (spec.input.step * 1e6).round() as i64;
+    let close = (i64::from(header.input_step_ppm) - step).abs() <= 1;
+    same("the input step fits", close.to_string(), true.to_string());
+    same(
+        "the tick [ms]",
+        header.tick_ms.to_string(),
+        spec.sampling.watch_ms().to_string(),
+    );
+    let ticks = spec.sampling.ticks_per_period();
+    same(
+        "ticks a period",
+        header.period_ticks.to_string(),
+        ticks.to_string(),
+    );
+    same(
+        "the delay [ticks]",
+        header.delay_ticks.to_string(),
+        spec.sampling
+            .ticks_of(spec.uncertainty.actuation_delay_s)
+            .to_string(),
+    );
+    let band = |band: &firmware::units::Band| format!("{:?}", [band.low_uhz, band.high_uhz]);
+    let requirements = &spec.requirements;
+    same(
+        "I1 [µHz]",
+        band(&header.outer),
+        format!("{:?}", requirements.outer_micro()),
+    );
+    same(
+        "I2 [µHz]",
+        band(&header.inner),
+        format!("{:?}", requirements.inner_micro()),
+    );
+    same(
+        "stay",
+        header.stay.to_string(),
+        requirements.stay.to_string(),
+    );
+    out
+}

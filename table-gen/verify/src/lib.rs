@@ -1,0 +1,260 @@
+//! The independent verifier: bytes of a table and a spec in, a verdict out.
+//!
+//! The closed loop of plant, firmware and table is explored forward from every state in which the event may find the
+//! grid. Quantiser, lookup and phase machine are the firmware's own; of synthesis and compression nothing is
+//! reachable from this package. Every rounding goes outward, so a claim that holds here holds for the real
+//! numbers.
+//!
+//! | step | module |
+//! |---|---|
+//! | plant, clocks and uncertainty of the closed loop | `closed_loop` |
+//! | a stretch of time with a held input, and the frequency within it | `segment` |
+//! | what the state that is decided on says of the real one, with a delay too | `knowledge` |
+//! | tight sets of states | `zonotope` |
+//! | the states on which the phase machine decides alike | `regions` |
+//! | the event at an unknown moment of a tick | `event` |
+//! | tables without Hold: tight sets in time, over the horizon | `timed` |
+//! | tables with Hold: No control by tight sets, then whole cells for ever | `watching`, `closed` |
+//! | the worst number of periods | `longest_path` |
+//! | claims and verdict | `claims`, `verdict` |
+//! | a real trajectory for a claim that fails | `witness`, `replay` |
+//!
+//! # What is claimed
+//! The event finds the grid in a state of `uncertainty.initial` and the firmware in No control, at any moment between
+//! two ticks. From then on loss, delivered participation and the estimate's error vary within their bounds as an
+//! adversary likes, the loss and the participation continuously in time.
+//!
+//! Whether I1 and I2 were left or reached is what the firmware measures at its ticks. Where commands act with a delay, it is what the
+//! firmware predicts there for the moment at which its command begins to act, and times end at that moment; bounds of f are always those of
+//! the real f.
+
+mod adversaries;
+mod cellset;
+mod claims;
+mod closed;
+mod closed_loop;
+mod event;
+pub mod falsify;
+mod header;
+mod knowledge;
+mod longest_path;
+
+mod path;
+mod regions;
+mod replay;
+mod segment;
+mod successor;
+mod tally;
+#[cfg(test)]
+mod tests;
+mod timed;
+mod verdict;
+mod watching;
+mod witness;
+mod zonotope;
+
+pub use path::ShownStep;
+pub use verdict::{Claim, Counterexample, Counts, RealPath, RealPoint, Verdict};
+
+use firmware::table::{TableError, TableView};
+use sha2::{Digest, Sha256};
+
+use claims::Findings;
+use closed_loop::Model;
+use model::spec::Spec;
+use regions::Regions;
+use replay::Replay;
+use tally::{Tally, Violation};
+
+/// Horizon \[s\] over which a table without Hold is explored where the spec asks for ever: it cannot be proven then, but
+/// a violation can be found.
+const OPEN_HORIZON_S: f64 = 300.0;
+
+/// Why there is no verdict.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum VerifyError {
+    /// The firmware rejects the table.
+    #[error("the firmware rejects the table: {0:?}")]
+    Table(TableError),
+    /// A part of the spec that the verifier does not cover.
+    #[error("{key} = {found}: not covered by the verifier; {remedy}")]
+    Unsupported {
+        /// The spec's key.
+        key: &'static str,
+        /// Its value.
+        found: String,
+        /// What is covered.
+        remedy: &'static str,
+    },
+    /// The observer ended it.
+    #[error("interrupted")]
+    Interrupted,
+}
+
+/// Examines a table against a spec. `go_on` is told how much is done, in \[0, 1\] and roughly, and may end it.
+///
+/// # Errors
+/// A table that the firmware rejects, a spec that is not covered, or an end by `go_on`. A claim that fails is a result.
+pub fn verify(
+    bytes: &[u8],
+    spec: &Spec,
+    go_on: &dyn Fn(f64) -> bool,
+) -> Result<Verdict, VerifyError> {
+    let table = TableView::parse(bytes).map_err(VerifyError::Table)?;
+    let header = table.header();
+    let model = Model::new(&table, spec);
+    let regions = Regions::new(header, model.error);
+    let [first, real, from] = [
+        model.knowledge.first,
+        model.knowledge.real,
+        model.knowledge.before,
+    ]
+    .map(|error| Regions::new(header, error));
+    let settle_ticks = (spec.requirements.settle_within_s / model.tick_s).floor() as u32;
+    let [low, high] = spec.requirements.inner_hz;
+    let inner = closed_loop::micro(low).join(closed_loop::micro(high));
+    let mut counts = Counts::default();
+    let (tally, reachable_cells, method, scope) = if let Some(limit) = &model.knowledge.limit {
+        let tally = Tally {
+            limit: Some(limit.clone()),
+            ..Tally::default()
+        };
+        (tally, 0, "not explored", String::new())
+    } else if header.stay {
+        let job = closed::Closed {
+            table: &table,
+            model: &model,
+            real: &real,
+            from: &from,
+            inner,
+        };
+        let watching = watching::Watching {
+            table: &table,
+            model: &model,
+            regions: &regions,
+            first: &first,
+        };
+        let (tally, cells) =
+            for_ever(&job, &watching, &mut counts, go_on).ok_or(VerifyError::Interrupted)?;
+        (tally, cells, "closed set of cells", String::new())
+    } else {
+        let horizon_s = spec.requirements.horizon_s;
+        let ticks = (horizon_s.unwrap_or(OPEN_HORIZON_S) / model.tick_s).ceil() as u32;
+        let explored = timed::Timed::new(&table, &model, [&regions, &real], settle_ticks)
+            .run(ticks, go_on)
+            .ok_or(VerifyError::Interrupted)?;
+        let mut tally = explored.tally;
+        let scope = match horizon_s {
+            Some(s) => format!(" over {s} s from the event"),
+            None => {
+                tally.limit.get_or_insert_with(|| {
+                    "for ever cannot be proven without Hold: set requirements.stay or requirements.horizon_s".to_owned()
+                });
+                String::new()
+            }
+        };
+        tally.settle_ticks = tally.settle_ticks.max(explored.open_ticks);
+        counts.sets = explored.nodes;
+        let first = f64::from(tally.event_ticks) * model.tick_s;
+        counts.event_to_inner_s = (tally.event_ticks > 0).then_some(first);
+        (tally, explored.cells, "tight sets in time", scope)
+    };
+    counts.lookups = tally.lookups;
+    counts.held_hz = tally.held.map(|range| [range.low / 1e6, range.high / 1e6]);
+    counts.highest_hz = tally.highest.map(|f| f / 1e6);
+    let claims = Findings {
+        table: &table,
+        spec,
+        model: &model,
+        tally: &tally,
+        scope,
+    }
+    .claims();
+    let ticks =
+        (spec.requirements.horizon_s.unwrap_or(OPEN_HORIZON_S) / model.tick_s).ceil() as u32;
+    let replay = Replay::new(&table, &model, [inner.low, inner.high], settle_ticks);
+    Ok(Verdict {
+        verified: claims.iter().all(|claim| claim.holds),
+        spec: spec.name.clone(),
+        claims,
+        reachable_cells,
+        counterexample: counterexample(&tally, &model, &replay, ticks),
+        spec_hash: hex(&spec.hash()),
+        table_spec_hash: hex(&header.spec_hash),
+        table_sha256: hex(&Sha256::digest(bytes)),
+        table_bytes: bytes.len(),
+        method,
+        counts,
+        tool_version: env!("CARGO_PKG_VERSION"),
+    })
+}
+
+/// No control by tight sets, then the closed set of cells.
+fn for_ever(
+    job: &closed::Closed<'_>,
+    watching: &watching::Watching<'_>,
+    counts: &mut Counts,
+    go_on: &dyn Fn(f64) -> bool,
+) -> Option<(Tally, u64)> {
+    let mut tally = Tally::default();
+    let watched = watching.watch(&mut tally);
+    counts.sets = watched.traces.len() as u64;
+    counts.first_cells = watched.seeds.len() as u64;
+    let seeds: Vec<u32> = watched.seeds.keys().copied().collect();
+    let seed_path = |cell: u32| match watched.seeds.get(&cell) {
+        Some(trace) => watched.traces.path(*trace),
+        None => Vec::new(),
+    };
+    let cells = job.run(seeds, &seed_path, &mut tally, go_on)?;
+    // From the last tick inside I1 to the first decision, then the periods, then until Hold's first command acts.
+    let settle = 1 + tally.periods * job.model.period_ticks + job.model.delay_ticks();
+    tally.settle_ticks = settle;
+    if let Some(last) = watched.last_tick
+        && tally.limit.is_none()
+        && !tally.violations.contains_key(&Violation::Late)
+    {
+        // The first tick comes up to a tick after the event.
+        let ticks = last + tally.settle_ticks;
+        counts.event_to_inner_s = Some(f64::from(ticks) * job.model.tick_s);
+    }
+    Some((tally, cells))
+}
+
+fn counterexample(
+    tally: &Tally,
+    model: &Model,
+    replay: &Replay<'_>,
+    ticks: u32,
+) -> Option<Counterexample> {
+    // Of several violations the one with a real trajectory says most.
+    let mut open = None;
+    for (kind, found) in &tally.violations {
+        let claim = match kind {
+            Violation::Containment => "containment",
+            Violation::Late => "settle",
+            Violation::Left => "stay",
+            Violation::Handover => "hand-over",
+            Violation::Uncovered | Violation::Visits => "table",
+        };
+        let real = witness::find(replay, model, *kind, ticks);
+        let shown = Counterexample {
+            claim,
+            what: found.what.clone(),
+            path: found
+                .path
+                .iter()
+                .map(|step| step.shown(model.tick_s))
+                .collect(),
+            real,
+        };
+        if shown.real.is_some() {
+            return Some(shown);
+        }
+        open.get_or_insert(shown);
+    }
+    open
+}
+
+fn hex(bytes: &[u8]) -> String {
+    bytes.iter().map(|byte| format!("{byte:02x}")).collect()
+}
