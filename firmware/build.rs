@@ -1,12 +1,14 @@
 //! Link arguments, memory map and table of the images.
 //!
-//! Nothing here applies to the host or to a build of the library alone. The memory map is copied into the build's own
-//! folder, so that the linker finds it from whatever folder cargo was started in.
+//! Nothing here applies to the host or to a build of the library alone. The memory map is copied
+//! into the build's own folder, so that the linker finds it from whatever folder cargo was started
+//! in.
 
 use std::path::{Path, PathBuf};
 use std::{env, fs, io};
 
-/// The table that `holdfast` carries unless `HOLDFAST_TABLE` names another, from the workspace's root.
+/// The table that `holdfast` carries unless `HOLDFAST_TABLE` names another, from the workspace's
+/// root.
 const TABLE_DEFAULT: &str = "firmware/tables/paper-bi.bin";
 
 fn main() -> io::Result<()> {
@@ -16,8 +18,8 @@ fn main() -> io::Result<()> {
     if !is("CARGO_CFG_TARGET_OS", "none") {
         return Ok(());
     }
-    // The reference board's map, and that of the emulated RISC-V board. The linker looks into the folder it is started in
-    // first, which may hold the other, so the names differ.
+    // The reference board's map, and that of the emulated RISC-V board. The linker looks into the
+    // folder it is started in first, which may hold the other, so the names differ.
     let (map, name) = if is("CARGO_CFG_TARGET_ARCH", "arm") {
         ("memory.x", "memory.x")
     } else {
@@ -30,8 +32,8 @@ fn main() -> io::Result<()> {
     println!("cargo::rerun-if-changed={}", memory.display());
     fs::copy(&memory, out.join(name))?;
     println!("cargo::rustc-link-search={}", out.display());
-    // Sections must not be padded to pages; the runtime's script comes from cortex-m-rt or riscv-rt, and the latter leaves
-    // it to us to include the map.
+    // Sections must not be padded to pages; the runtime's script comes from cortex-m-rt or
+    // riscv-rt, and the latter leaves it to us to include the map.
     println!("cargo::rustc-link-arg-bins=--nmagic");
     if name != "memory.x" {
         println!("cargo::rustc-link-arg-bins=-T{name}");
@@ -43,8 +45,8 @@ fn main() -> io::Result<()> {
     table(&root, &out)
 }
 
-/// Copies the table to where the image includes it. Without a table the section stays empty: the charger then starts with
-/// the droop until a table is flashed.
+/// Copies the table to where the image includes it. Without a table the section stays empty: the
+/// charger then starts with the droop until a table is flashed.
 fn table(root: &Path, out: &Path) -> io::Result<()> {
     let named = env::var_os("HOLDFAST_TABLE");
     let path = root.join(named.clone().unwrap_or_else(|| TABLE_DEFAULT.into()));

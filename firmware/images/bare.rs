@@ -1,8 +1,9 @@
 //! The charger without a HAL, for measuring: what the library costs by itself.
 //!
-//! The same parts as in `holdfast` (zero crossings, supervisor, pilot, contactor, telemetry) over pins that are words in
-//! RAM. It plays a falling frequency with glitches, a silent mains, a late tick and a jump of the clock for ever, so that
-//! every path takes its turn; the stack is painted by the runtime and read off the emulator's memory.
+//! The same parts as in `holdfast` (zero crossings, supervisor, pilot, contactor, telemetry) over
+//! pins that are words in RAM. It plays a falling frequency with glitches, a silent mains, a late
+//! tick and a jump of the clock for ever, so that every path takes its turn; the stack is painted
+//! by the runtime and read off the emulator's memory.
 #![no_std]
 #![no_main]
 

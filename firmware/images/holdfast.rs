@@ -9,8 +9,9 @@
 //! | PA8 | signed power set-point, 1 kHz (TIM1 channel 1), see [`firmware::dispatch::power_line`] | feature `bidirectional` |
 //! | PA2 | telemetry, 115 200 baud 8N1 (USART2) | always |
 //!
-//! One loop, no interrupts: the timer captures a crossing in hardware, and the loop comes round far more often than the
-//! 20 ms until the next. The watchdog bites after four ticks without a completed one, and a panic ends in it too.
+//! One loop, no interrupts: the timer captures a crossing in hardware, and the loop comes round far
+//! more often than the 20 ms until the next. The watchdog bites after four ticks without a
+//! completed one, and a panic ends in it too.
 #![no_std]
 #![no_main]
 

@@ -1,8 +1,10 @@
-//! The processor-in-the-loop image: the charger of [`firmware::link`] on an emulated core, Arm or RISC-V.
+//! The processor-in-the-loop image: the charger of [`firmware::link`] on an emulated core, Arm or
+//! RISC-V.
 //!
-//! It reads requests from the file `to-target` and writes replies to `to-host`, both opened by semihosting in the
-//! emulator's working folder; they are FIFOs there. The table is whatever the TABLE region holds. Each reply carries what
-//! the answer cost: ticks of the system timer (Arm), and stack below this frame, which is painted before and searched after.
+//! It reads requests from the file `to-target` and writes replies to `to-host`, both opened by
+//! semihosting in the emulator's working folder; they are FIFOs there. The table is whatever the
+//! TABLE region holds. Each reply carries what the answer cost: ticks of the system timer (Arm),
+//! and stack below this frame, which is painted before and searched after.
 #![no_std]
 #![no_main]
 
@@ -46,14 +48,16 @@ fn paint() -> *mut u32 {
     let top = top.wrapping_sub(16);
     let bottom = top.wrapping_sub(PAINTED_WORDS);
     for word in 0..PAINTED_WORDS {
-        // SAFETY: the words lie below the stack pointer, where nothing lives while no interrupt is enabled, and within
-        // the RAM of at least 16 KB, of which this image's variables take less than 4 KB at the other end.
+        // SAFETY: the words lie below the stack pointer, where nothing lives while no interrupt is
+        // enabled, and within the RAM of at least 16 KB, of which this image's variables take less
+        // than 4 KB at the other end.
         unsafe { bottom.wrapping_add(word).write_volatile(PAINT) };
     }
     bottom
 }
 
-/// Bytes of stack used below the caller's frame since [`paint`]; the painted size if all was overwritten.
+/// Bytes of stack used below the caller's frame since [`paint`]; the painted size if all was
+/// overwritten.
 #[inline(never)]
 fn used(bottom: *mut u32) -> u32 {
     let untouched = (0..PAINTED_WORDS).find(|word| {

@@ -1,21 +1,27 @@
 //! The supervisor: one tick from a frequency reading to the charger's set-point.
 //!
-//! `source -> gate -> filter -> observer -> control loop -> dispatch`, and a defined [`Mode`] for every way in which a part
-//! of it can be missing. Nothing here fails: what is wrong at a tick is in the [`Report`].
+//! `source -> gate -> filter -> observer -> control loop -> dispatch`, and a defined [`Mode`] for
+//! every way in which a part of it can be missing. Nothing here fails: what is wrong at a tick is
+//! in the [`Report`].
 //!
 //! ## Time
-//! The caller ticks every `tick_ms` by a millisecond clock that may wrap. A late tick advances the observer by the ticks that
-//! were missed, up to [`CATCH_UP_TICKS_MAX`], with the frequency interpolated, and the period's clock with it, and decides
-//! once; a larger step of the clock, or one backwards, makes the observer start again. A tick that comes too early advances nothing.
+//! The caller ticks every `tick_ms` by a millisecond clock that may wrap. A late tick advances the
+//! observer by the ticks that were missed, up to [`CATCH_UP_TICKS_MAX`], with the frequency
+//! interpolated. The period's clock advances with it, and the tick decides once. A larger step of
+//! the clock, or one backwards, makes the observer start again. A tick that comes too early
+//! advances nothing.
 //!
 //! ## Trust
-//! After a start nobody knows the governor chain: the grid may be in the middle of an event. The observer's initial error
-//! dies out with its slowest time constant, so the droop, which needs f alone, is in force for [`trust_ticks`]; at least for the
-//! table's delay, after which every command under way is one that was noted since.
+//! After a start nobody knows the governor chain: the grid may be in the middle of an event. The
+//! observer's initial error dies out with its slowest time constant. So the droop, which needs f
+//! alone, is in force for [`trust_ticks`], and at least for the table's delay: after that every
+//! command under way is one that was noted since.
 
+mod clock;
 mod config;
 mod report;
 
+pub use clock::CATCH_UP_TICKS_MAX;
 pub use config::{ChargerConfig, trust_ticks};
 pub use report::Report;
 
@@ -32,13 +38,14 @@ use crate::phase::Phase;
 use crate::table::{TableError, TableView, field};
 use crate::units::{Participation, State};
 use crate::wide::divide;
-use report::log_changes;
+use clock::{Due, TickClock};
+use report::{ChangeLog, Standing};
 
-/// Most ticks made good by one late tick: longer gaps make the interpolation a guess.
-pub const CATCH_UP_TICKS_MAX: u16 = 5;
 /// Tick without a table \[ms\].
 pub const TICK_MS_DEFAULT: u16 = 100;
-/// Feeds the watchdog. Only a completed tick calls it: every step done, and the set-point accepted by the hardware.
+
+/// Feeds the watchdog. Only a completed tick calls it: every step done, and the set-point accepted
+/// by the hardware.
 pub trait Watchdog {
     /// Restarts the watchdog's time.
     fn feed(&mut self);
@@ -65,10 +72,12 @@ pub struct Charger<'t, S, D, W> {
     warm_up_ticks: u16,
     warm_up_left: u16,
     lost_ticks: u16,
-    /// When the last tick was due.
-    last_ms: Option<u32>,
+    clock: TickClock,
+    /// Ticks since the start; saturates.
+    sequence: u32,
     f_uhz: i32,
-    last: Report,
+    standing: Standing,
+    changes: ChangeLog,
 }
 
 impl<'t, S: FrequencySource, D: Dispatch, W: Watchdog> Charger<'t, S, D, W> {
@@ -87,8 +96,8 @@ impl<'t, S: FrequencySource, D: Dispatch, W: Watchdog> Charger<'t, S, D, W> {
 
     /// The same for a table that was parsed already, as where many chargers share one.
     ///
-    /// Not inlined: what is put together here must not lie on the stack while the table is parsed, which is where the
-    /// stack is deepest.
+    /// Not inlined: what is put together here must not lie on the stack while the table is parsed,
+    /// which is where the stack is deepest.
     #[inline(never)]
     pub fn with_table(
         source: S,
@@ -146,9 +155,11 @@ impl<'t, S: FrequencySource, D: Dispatch, W: Watchdog> Charger<'t, S, D, W> {
             warm_up_ticks,
             warm_up_left: warm_up_ticks,
             lost_ticks: 0,
-            last_ms: None,
+            clock: TickClock::new(tick_ms),
+            sequence: 0,
             f_uhz: 0,
-            last: Report::FIRST,
+            standing: Standing::FIRST,
+            changes: ChangeLog::FIRST,
         }
     }
 
@@ -179,73 +190,63 @@ impl<'t, S: FrequencySource, D: Dispatch, W: Watchdog> Charger<'t, S, D, W> {
 
     /// One tick.
     pub fn tick(&mut self, now_ms: u32) -> Report {
-        let mut report = Report {
-            sequence: self.last.sequence.saturating_add(1),
-            now_ms,
-            set_point: None,
-            faults: Faults::NONE,
-            ..self.last
-        };
-        let due = self.ticks_due(now_ms, &mut report.faults);
+        let mut faults = Faults::NONE;
+        let due = self.ticks_due(now_ms, &mut faults);
         let reading = self.source.read(now_ms);
         match self.gate.admit(reading) {
-            Ok(f_uhz) => self.follow(f_uhz, due, &mut report),
+            Ok(f_uhz) => self.follow(f_uhz, due, &mut faults),
             Err(error) => {
-                report.faults.insert(error.into());
-                self.without_frequency(due, &mut report);
+                faults.insert(error.into());
+                self.without_frequency(due);
             }
         }
+        self.sequence = self.sequence.saturating_add(1);
         if self.control.table_error().is_some() {
-            report.faults.insert(Faults::TABLE_REJECTED);
+            faults.insert(Faults::TABLE_REJECTED);
         }
-        if report.mode == Mode::WarmUp || self.warm_up_left > 0 {
+        if self.standing.mode == Mode::WarmUp || self.warm_up_left > 0 {
             if self.restarted {
-                report.faults.insert(Faults::RESTARTED);
+                faults.insert(Faults::RESTARTED);
             }
         } else {
             self.restarted = false;
         }
-        match self.dispatch.apply(report.participation, now_ms) {
-            Ok(set_point) => {
-                report.set_point = Some(set_point);
-                self.watchdog.feed();
-            }
-            Err(_) => report.faults.insert(Faults::DISPATCH),
+        let applied = self.dispatch.apply(self.standing.participation, now_ms);
+        match applied {
+            Ok(_) => self.watchdog.feed(),
+            Err(_) => faults.insert(Faults::DISPATCH),
         }
-        log_changes(&self.last, &report);
-        self.last = report;
+        let standing = self.standing;
+        let report = Report {
+            sequence: self.sequence,
+            now_ms,
+            mode: standing.mode,
+            phase: standing.phase,
+            state: standing.state,
+            loss_kw: standing.loss_kw,
+            participation: standing.participation,
+            set_point: applied.ok(),
+            faults,
+        };
+        self.changes.note(&report);
         report
     }
 
     /// Ticks by which to advance; starts the observer again after a jump of the clock.
     fn ticks_due(&mut self, now_ms: u32, faults: &mut Faults) -> u16 {
-        let tick = u32::from(self.tick_ms).max(1);
-        let Some(last_ms) = self.last_ms else {
-            self.last_ms = Some(now_ms);
-            return 1;
-        };
-        // The nearest whole number of ticks; a tick may come up to half a tick early or late.
-        let elapsed = now_ms.wrapping_sub(last_ms).wrapping_add(tick / 2);
-        if elapsed >= u32::MAX / 2 {
-            // Before the half tick of tolerance: a little early is nothing, more is a clock that went back.
-            let early = last_ms.wrapping_sub(now_ms);
-            if early <= tick {
-                return 0;
-            }
-        } else {
-            let due = elapsed / tick;
-            if due <= u32::from(CATCH_UP_TICKS_MAX) {
+        match self.clock.due(now_ms) {
+            Due::Ticks(due) => {
                 if due > 1 {
                     faults.insert(Faults::OVERRUN);
                 }
-                self.last_ms = Some(last_ms.wrapping_add(due * tick));
-                return due as u16;
+                due
+            }
+            Due::Jumped => {
+                faults.insert(Faults::CLOCK_JUMP);
+                self.start_again();
+                1
             }
         }
-        faults.insert(Faults::CLOCK_JUMP);
-        self.last_ms = Some(now_ms);
-        self.start_again();
-        1
     }
 
     /// Forgets what the observer and the control loop know.
@@ -261,14 +262,11 @@ impl<'t, S: FrequencySource, D: Dispatch, W: Watchdog> Charger<'t, S, D, W> {
         }
     }
 
-    fn follow(&mut self, f_uhz: i32, due: u16, report: &mut Report) {
+    fn follow(&mut self, f_uhz: i32, due: u16, faults: &mut Faults) {
         let lost = self.lost_ticks;
         self.lost_ticks = 0;
-        if lost > self.config.hold_ticks {
-            self.f_uhz = f_uhz;
-            self.start_again();
-        } else if self.last.sequence == 0 {
-            // The first reading: the best guess is a grid that has been there for long.
+        // The first reading: the best guess is a grid that has been there for long.
+        if lost > self.config.hold_ticks || self.sequence == 0 {
             self.f_uhz = f_uhz;
             self.start_again();
         }
@@ -282,94 +280,102 @@ impl<'t, S: FrequencySource, D: Dispatch, W: Watchdog> Charger<'t, S, D, W> {
             } else {
                 from.wrapping_add_unsigned(way)
             };
-            self.advance(at, report);
+            self.advance(at);
         }
         if due > 0 {
             // What was held stayed held: one decision, however many ticks were missed.
             let missed = due - 1;
             self.control.skip(missed);
             self.warm_up_left = self.warm_up_left.saturating_sub(missed);
-            self.decide(due, report);
-            // The one place that notes a command: whatever was decided, and by whom.
-            report.participation = self.control.impose(report.participation);
+            self.decide(due, faults);
         }
     }
 
     /// One tick of the observer.
-    fn advance(&mut self, f_uhz: i32, report: &mut Report) {
+    fn advance(&mut self, f_uhz: i32) {
         self.f_uhz = f_uhz;
-        let acting = self.control.acting(report.participation);
-        report.state = match &mut self.observer {
+        let acting = self.control.acting(self.standing.participation);
+        self.standing.state = match &mut self.observer {
             Some(observer) => {
                 let state = observer.step(f_uhz);
-                report.loss_kw = observer.loss_kw(acting);
+                self.standing.loss_kw = observer.loss_kw(acting);
                 state
             }
             None => State([f_uhz, 0, 0, 0]),
         };
     }
 
-    /// One tick of the control loop, or of what stands in for it, `due` ticks after the last.
-    fn decide(&mut self, due: u16, report: &mut Report) {
+    /// One tick of the control loop, or of what stands in for it, `due` ticks after the last. Every
+    /// path commands once.
+    fn decide(&mut self, due: u16, faults: &mut Faults) {
+        let state = self.standing.state;
         if self.warm_up_left > 0 {
             self.warm_up_left -= 1;
-            report.mode = Mode::WarmUp;
-            report.phase = Phase::Fallback;
-            report.participation = self.droop.participation(report.state);
+            self.standing.mode = Mode::WarmUp;
+            self.standing.phase = Phase::Fallback;
+            let participation = self.droop.participation(state);
+            self.standing.participation = self.control.command(participation);
             return;
         }
-        let f_uhz = report.state.frequency_uhz();
-        // Still the last tick's participation.
-        let before = report.participation;
+        let f_uhz = state.frequency_uhz();
         if let Some(event) = &mut self.event {
             match event.course(f_uhz, due) {
                 Course::Release(participation) => {
-                    report.participation = participation;
-                    report.mode = Mode::Release;
+                    self.standing.mode = Mode::Release;
+                    self.standing.participation = self.control.command(participation);
                     return;
                 }
                 Course::Anew | Course::Over => self.control.end_event(),
                 Course::Follow => {}
             }
         }
-        let action = self.control.ask(report.state);
-        report.participation = action.participation;
-        report.phase = action.phase;
-        report.mode = match action.source {
-            Source::Table => Mode::Table,
-            Source::DroopNoTable => Mode::DroopNoTable,
-            Source::DroopOutside => {
-                report.faults.insert(Faults::OUTSIDE_DOMAIN);
-                Mode::DroopOutside
-            }
-        };
-        if let Some(event) = &mut self.event {
+        // The last tick's.
+        let before = self.standing.participation;
+        let mut released = false;
+        let event = &mut self.event;
+        let action = self.control.step_or(state, |action| {
             let responding = action.phase != Phase::NoControl;
             let covered = action.source == Source::Table;
-            if event.ends(f_uhz, responding, covered, before, due) {
-                report.participation = before;
-                report.mode = Mode::Release;
+            if let Some(event) = event {
+                released = event.ends(f_uhz, responding, covered, before, due);
             }
+            if released {
+                before
+            } else {
+                action.participation
+            }
+        });
+        self.standing.participation = action.participation;
+        self.standing.phase = action.phase;
+        if action.source == Source::DroopOutside {
+            faults.insert(Faults::OUTSIDE_DOMAIN);
         }
+        self.standing.mode = match action.source {
+            _ if released => Mode::Release,
+            Source::Table => Mode::Table,
+            Source::DroopNoTable => Mode::DroopNoTable,
+            Source::DroopOutside => Mode::DroopOutside,
+        };
     }
 
-    fn without_frequency(&mut self, due: u16, report: &mut Report) {
+    fn without_frequency(&mut self, due: u16) {
         self.lost_ticks = self.lost_ticks.saturating_add(due);
         if self.lost_ticks <= self.config.hold_ticks {
-            report.mode = Mode::Hold;
+            self.standing.mode = Mode::Hold;
             self.control.hold(due);
-            // The chain follows the last frequency; the loss estimate would see a kink that was not there.
+            // The chain follows the last frequency; the loss estimate would see a kink that was not
+            // there.
             for _ in 0..due {
-                self.advance(self.f_uhz, report);
+                self.advance(self.f_uhz);
             }
         } else {
-            report.mode = Mode::Safe;
-            report.phase = Phase::Fallback;
+            self.standing.mode = Mode::Safe;
+            self.standing.phase = Phase::Fallback;
             let release = self.config.release_ppm.saturating_mul(u32::from(due));
-            let ppm = report.participation.ppm().saturating_sub(release);
-            report.participation = Participation::from_ppm(ppm);
+            let ppm = self.standing.participation.ppm().saturating_sub(release);
+            self.standing.participation = Participation::from_ppm(ppm);
         }
-        report.loss_kw = None;
+        self.standing.loss_kw = None;
         if let Some(observer) = &mut self.observer {
             observer.reset_loss();
         }

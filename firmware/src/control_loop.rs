@@ -1,11 +1,17 @@
 //! One tick of the charger: a state in, an action out.
 //!
-//! The loop never fails: a rejected table or a state that no law covers is answered by the baseline droop, and the
-//! action says so.
+//! The loop never fails: a rejected table or a state that no law covers is answered by the baseline
+//! droop, and the action says so.
 //!
-//! Where the table's commands act with a delay, the loop remembers those that are under way and decides on the predicted state
-//! ([`crate::prediction`]). The memory holds levels; so the droop, too, then answers in whole levels, and the prediction knows exactly what is
-//! under way. An event's end keeps the memory: what was commanded last still acts when the next event begins within the delay.
+//! ## Commands that act late
+//! Where the table's commands act with a delay, the loop remembers those that are under way and
+//! decides on the predicted state ([`crate::prediction`]). The memory holds levels. So the droop
+//! then answers in whole levels too, and the prediction knows exactly what is under way. The end of
+//! an event keeps the memory: what was commanded last still acts when the next event begins within
+//! the delay.
+//!
+//! So the loop must be told of every command, its own or not, once a tick. Each of the ways to a
+//! command notes it: [`ControlLoop::step`], [`ControlLoop::step_or`] and [`ControlLoop::command`].
 
 use crate::droop::Droop;
 use crate::phase::{Phase, PhaseState, Step};
@@ -45,8 +51,8 @@ pub struct ControlLoop<'t> {
 }
 
 impl<'t> ControlLoop<'t> {
-    /// A loop before the event. `bytes` is the flash image of the table; if it is rejected, [`Droop::PAPER`] is in force
-    /// for good.
+    /// A loop before the event. `bytes` is the flash image of the table. If it is rejected,
+    /// [`Droop::PAPER`] is in force for good.
     pub fn new(bytes: &'t [u8]) -> Self {
         Self::with_table(TableView::parse(bytes))
     }
@@ -80,15 +86,25 @@ impl<'t> ControlLoop<'t> {
         self.state
     }
 
-    /// Advances by one tick (`sampling.watch_s`) with the state measured at it, and takes note of the action.
+    /// Advances by one tick (`sampling.watch_s`) with the state measured at it. The action is
+    /// commanded.
     pub fn step(&mut self, state: State) -> Action {
-        let mut action = self.ask(state);
-        action.participation = self.impose(action.participation);
+        self.step_or(state, |action| action.participation)
+    }
+
+    /// The same for a caller that may command something else: `choose` sees what the loop decided
+    /// and says what is commanded. The action that comes back holds the latter.
+    pub fn step_or(
+        &mut self,
+        state: State,
+        choose: impl FnOnce(&Action) -> Participation,
+    ) -> Action {
+        let mut action = self.decide(state);
+        action.participation = self.command(choose(&action));
         action
     }
 
-    /// The same for a caller that may command something else: [`ControlLoop::impose`] must be told what, once a tick.
-    pub fn ask(&mut self, state: State) -> Action {
+    fn decide(&mut self, state: State) -> Action {
         let Ok(table) = &self.table else {
             self.state.phase = Phase::Fallback;
             return Action {
@@ -114,10 +130,12 @@ impl<'t> ControlLoop<'t> {
         }
     }
 
-    /// Takes note of the participation that was decided for this tick, and returns what is to be commanded: with a delay the nearest
-    /// level of the table, else the same. A level's own participation is that level again.
+    /// One tick at which the loop is not asked: this participation was decided elsewhere. Returns
+    /// what is to be commanded: with a delay the nearest level of the table, else the same. A
+    /// level's own participation is that level again.
+    #[must_use = "this, not the participation given, is what the loop has noted as commanded"]
     #[inline(never)]
-    pub fn impose(&mut self, participation: Participation) -> Participation {
+    pub fn command(&mut self, participation: Participation) -> Participation {
         let Some(header) = self.delayed() else {
             return participation;
         };
@@ -132,7 +150,8 @@ impl<'t> ControlLoop<'t> {
         commanded
     }
 
-    /// The participation that acts until the next tick is decided: with a delay an earlier command, else the last one, which is given.
+    /// The participation that acts until the next tick is decided: with a delay an earlier command,
+    /// else the last one, which is given.
     pub fn acting(&self, last: Participation) -> Participation {
         match self.delayed() {
             Some(header) => header.participation(self.history.level(header.delay_ticks)),
@@ -146,8 +165,8 @@ impl<'t> ControlLoop<'t> {
         (header.delay_ticks > 0).then_some(header)
     }
 
-    /// Lets the period's clock run on by ticks that nobody measured; a decision that fell due meanwhile is made at the next
-    /// [`ControlLoop::step`].
+    /// Lets the period's clock run on by ticks that nobody measured. A decision that fell due
+    /// meanwhile is made at the next [`ControlLoop::step`].
     pub fn skip(&mut self, ticks: u16) {
         self.state.ticks_left = self.state.ticks_left.saturating_sub(ticks);
         self.hold(ticks);
@@ -169,7 +188,8 @@ impl<'t> ControlLoop<'t> {
         self.state = PhaseState::INITIAL;
     }
 
-    /// Forgets the event and the commands under way, as after a restart: nobody knows them until the delay has passed.
+    /// Forgets the event and the commands under way, as after a restart: nobody knows them until
+    /// the delay has passed.
     pub fn reset(&mut self) {
         self.end_event();
         self.history = History::NONE;

@@ -1,8 +1,9 @@
 //! The baseline droop, used as the fallback law.
 //!
-//! The paper's baseline (its Fig. 2) is a dead band, a droop `1/R_ev`, a lag `1/(T_ev s + D)` and a saturation. The lag
-//! of `T_ev` = 35 ms is that of the power electronics, an order below one tick, so the device computes the lag's
-//! resting value `(-f - deadband) / (R_ev D)` and leaves the lag to the hardware.
+//! The paper's baseline (its Fig. 2) is a dead band, a droop `1/R_ev`, a lag `1/(T_ev s + D)` and a
+//! saturation. The lag of `T_ev` = 35 ms is that of the power electronics, an order below one tick,
+//! so the device computes the lag's resting value `(-f - deadband) / (R_ev D)` and leaves the lag
+//! to the hardware.
 
 use crate::units::{MICRO, Participation, State};
 use crate::wide::divide;
@@ -17,7 +18,8 @@ pub struct Droop {
 }
 
 impl Droop {
-    /// The baseline of the paper's Table I: dead band 0.15 Hz, `R_ev D` = 0.5 Hz. For a charger whose table is rejected.
+    /// The baseline of the paper's Table I: dead band 0.15 Hz, `R_ev D` = 0.5 Hz. For a charger
+    /// whose table is rejected.
     pub const PAPER: Self = Self {
         deadband_uhz: 150_000,
         full_uhz: 500_000,

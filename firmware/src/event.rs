@@ -1,27 +1,34 @@
 //! The end of an event: when a charger goes back to ordinary charging, and how.
 //!
-//! The table's laws know an event's beginning (f below I1) and its course, but no end: Hold and Fixed go on for as long as
-//! f stays in I2. Meanwhile the operator replaces the lost power by reserves, f recovers, and the fleet must give the
-//! grid its demand back, though not at once: a fleet of 2 GW that resumes in one tick is the next event.
+//! The table's laws know how an event begins (f below I1) and how it goes on. They know no end:
+//! Hold and Fixed stay in force for as long as f stays in I2. Meanwhile the operator replaces the
+//! lost power by reserves, and f recovers. Then the fleet must give the grid its demand back, but
+//! not at once: a fleet of 2 GW that resumes in one tick is the next event.
 //!
 //! | f | while the event lasts | while it is released |
 //! |---|---|---|
-//! | above I1 | ends it if no law covers the state any more | participation falls ten times as fast |
-//! | recovered | counts; ends it after [`EventEnd::recovered_s`] in a row | participation falls over [`EventEnd::release_s`] |
+//! | above I1 | ends it, if no law covers the state | participation falls ten times as fast |
+//! | recovered | counts, and ends it in time | participation falls slowly |
 //! | below recovered | counts from zero again | participation stands still |
 //! | below I1 | | the event begins anew: the table decides at once |
 //!
-//! When participation has reached zero the machine is in No control again.
+//! The times are those of [`EventEnd`]. At a participation of zero the machine is in No control
+//! again.
 //!
 //! ## Why so
-//! f may have recovered only because the fleet holds it. The release is slow against the grid (minutes against half a
-//! minute), so f follows it as if at rest, and stands still when f is no longer recovered: a release that comes too early
-//! stops well above I1 and goes on when reserves have come. A law that was left upwards is no reason to jump to the
-//! droop's zero: that step down, and the step up when f is back in I2, would go on for ever.
+//! f may have recovered only because the fleet holds it. So the release is slow against the grid:
+//! minutes, where the grid needs half a minute. f then follows the release as if at rest. The
+//! release stands still when f is no longer recovered. A release that comes too early therefore
+//! stops well above I1, and goes on when the reserves have come.
+//!
+//! Where no law covers the state because f is above I1, the event ends too. The droop's answer
+//! would be zero there. Jumping to it would push f down into I2, the law would answer, f would rise
+//! out of I2, and so on for ever.
 //!
 //! ## What is proven
-//! The verdict on a table is about the event: it ends where the release begins. The release itself is tested, not proven;
-//! the next event is covered again once it begins from a grid near rest, as the spec's `uncertainty.initial` says.
+//! The verdict on a table is about the event, and the event ends where the release begins. The
+//! release is tested, not proven. The next event is covered again once it begins from a grid near
+//! rest, as the spec's `uncertainty.initial` says.
 
 use crate::units::{Band, Participation};
 
@@ -65,7 +72,9 @@ pub enum Course {
 enum Stage {
     /// No event, or one that lasts; ticks in a row with f recovered.
     Lasting(u32),
-    /// What is not released yet \[ppm\]. Kept here, for where commands act late only whole levels of it are commanded.
+    /// What is not released yet \[ppm\]. It is not read back from the command in force: where
+    /// commands act late, that one is rounded to whole levels, and small steps of the release would
+    /// be lost.
     Releasing(u32),
 }
 
@@ -98,7 +107,8 @@ impl EventWatch {
         self.stage = Stage::Lasting(0);
     }
 
-    /// Before the table is asked: what to do at a tick, `ticks` after the last one, at this frequency \[µHz\].
+    /// Before the table is asked: what to do at a tick, `ticks` after the last one, at this
+    /// frequency \[µHz\].
     pub fn course(&mut self, f_uhz: i32, ticks: u16) -> Course {
         let Stage::Releasing(last) = self.stage else {
             return Course::Follow;
@@ -124,8 +134,9 @@ impl EventWatch {
         Course::Release(Participation::from_ppm(left))
     }
 
-    /// After the table was asked: whether the release begins, now. `responding` says that an event is on; `covered`, that
-    /// a law covers the state; `last` is the participation in force, from which the release starts.
+    /// After the table was asked: whether the release begins, now. `responding` says that an event
+    /// is on; `covered`, that a law covers the state; `last` is the participation in force, from
+    /// which the release starts.
     pub fn ends(
         &mut self,
         f_uhz: i32,

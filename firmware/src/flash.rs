@@ -2,9 +2,9 @@
 
 use crate::table::{HEADER_LEN, field};
 
-/// The table's image at the start of a flash region, which may be larger than the table and may have been erased or
-/// written half. The header's length delimits it; a length that cannot be gives the whole region back, for the parser to
-/// reject with the reason.
+/// The table's image at the start of a flash region, which may be larger than the table and may
+/// have been erased or written half. The header's length delimits it; a length that cannot be gives
+/// the whole region back, for the parser to reject with the reason.
 pub fn image(region: &[u8]) -> &[u8] {
     let length = region
         .get(field::LENGTH)

@@ -1,7 +1,9 @@
-//! The uniform grid and its quantiser: the one implementation that device, abstraction and verifier share.
+//! The uniform grid and its quantiser: the one implementation that device, abstraction and verifier
+//! share.
 //!
-//! A cell is half-open on every axis, `[lower edge + i·width, lower edge + (i+1)·width)`, in micro-units. Integer
-//! arithmetic makes quantisation exact: there is no tolerance and no state that belongs to two cells.
+//! A cell is half-open on every axis, `[lower edge + i·width, lower edge + (i+1)·width)`, in
+//! micro-units. Integer arithmetic makes quantisation exact: there is no tolerance and no state
+//! that belongs to two cells.
 
 use crate::units::{AXIS_F, AXIS_G, AXIS_L, AXIS_P, STATES, State};
 
@@ -40,7 +42,8 @@ pub struct Grid {
 }
 
 impl Grid {
-    /// A grid from the lower edge of the first cell and the cell width \[micro-units\] and the cells of each axis.
+    /// A grid from the lower edge of the first cell and the cell width \[micro-units\] and the
+    /// cells of each axis.
     ///
     /// # Errors
     /// A zero width or count, an upper edge past `i32::MAX`, or more than `u32::MAX` cells.
@@ -129,8 +132,8 @@ impl Grid {
         }
     }
 
-    /// The half-open interval `[low, high)` of a cell on each axis \[micro-units\]. The cell must be of this grid
-    /// (`None` otherwise).
+    /// The half-open interval `[low, high)` of a cell on each axis \[micro-units\]. The cell must
+    /// be of this grid (`None` otherwise).
     pub const fn bounds(&self, cell: Cell) -> Option<[(i32, i32); STATES]> {
         let mut bounds = [(0, 0); STATES];
         let mut axis = 0;
@@ -145,7 +148,8 @@ impl Grid {
         Some(bounds)
     }
 
-    /// Position of a cell in a dense array, f fastest: `f + F·(g + G·(l + L·p))`. `None` for a cell of another grid.
+    /// Position of a cell in a dense array, f fastest: `f + F·(g + G·(l + L·p))`. `None` for a cell
+    /// of another grid.
     pub const fn index(&self, cell: Cell) -> Option<u32> {
         let mut index = 0u32;
         let mut axis = STATES;
@@ -159,7 +163,8 @@ impl Grid {
         Some(index)
     }
 
-    /// The cell at a position of the dense array: the inverse of [`Grid::index`]. `None` past the last.
+    /// The cell at a position of the dense array: the inverse of [`Grid::index`]. `None` past the
+    /// last.
     pub const fn cell(&self, index: u32) -> Option<Cell> {
         if index >= self.cells() {
             return None;
@@ -184,7 +189,8 @@ mod tests {
     use proptest::prelude::*;
 
     proptest! {
-        /// 300 · 40 · 7 · 2 cells: every position is the index of its cell, and the last is the last.
+        /// 300 · 40 · 7 · 2 cells: every position is the index of its cell, and the last is the
+        /// last.
         #[test]
         fn a_cell_is_the_inverse_of_its_index(index in 0u32..200_000) {
             let grid = Grid::new([-5, 0, 7, 0], [3, 1, 9, 2], [300, 40, 7, 2]).unwrap();

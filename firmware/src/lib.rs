@@ -20,8 +20,9 @@
 //! | [`flash`] | a flash region | the table's bytes |
 //! | [`link`] | requests of a host | the answers of a charger: processor in the loop |
 //!
-//! Nothing here allocates, recurses or panics; nothing is `unsafe`. Everything that decides is integer arithmetic,
-//! so the host's abstraction and verifier, the simulator and the charger compute the same bits.
+//! Nothing here allocates, recurses or panics; nothing is `unsafe`. Everything that decides is
+//! integer arithmetic, so the host's abstraction and verifier, the simulator and the charger
+//! compute the same bits.
 #![no_std]
 #![forbid(unsafe_code)]
 

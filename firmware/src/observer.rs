@@ -1,14 +1,17 @@
 //! The governor chain (g, l, p), reconstructed from frequency alone.
 //!
-//! The chain is driven by f and nothing else (`g' = (K f - g)/T_G`, `l' = (g + T_1 g' - l)/T_2`, `p' = (l - p)/T_t`), so
-//! the device can run a copy of it. Each tick advances the copy by the exact solution for a frequency that is linear
-//! between two samples (first-order hold), with coefficients computed once from the table's plant parameters.
+//! The chain is driven by f and nothing else (`g' = (K f - g)/T_G`, `l' = (g + T_1 g' - l)/T_2`,
+//! `p' = (l - p)/T_t`), so the device can run a copy of it. Each tick advances the copy by the
+//! exact solution for a frequency that is linear between two samples (first-order hold), with
+//! coefficients computed once from the table's plant parameters.
 //!
-//! Tradeoffs: f32 in GW and Hz. One rounding is at most 2^-23 relative, so a chain near 4 GW rounds by at most 0.5 kW a
-//! tick, and the slowest mode (T_2) forgets it within T_2 / tick ticks: below 0.1 MW for T_2 = 12 s and 100 ms ticks.
-//! Additions and products only, in a fixed order: host and target agree to the bit.
+//! Tradeoffs: f32 in GW and Hz. One rounding is at most 2^-23 relative, so a chain near 4 GW rounds
+//! by at most 0.5 kW a tick, and the slowest mode (T_2) forgets it within T_2 / tick ticks: below
+//! 0.1 MW for T_2 = 12 s and 100 ms ticks. Additions and products only, in a fixed order: host and
+//! target agree to the bit.
 //!
-//! [`bound`] bounds the error of the estimate, for the spec; [`loss`] estimates the lost power as well.
+//! [`bound`] bounds the error of the estimate, for the spec; [`loss`] estimates the lost power as
+//! well.
 
 pub mod bound;
 pub mod loss;
@@ -20,7 +23,8 @@ use loss::LossEstimator;
 use crate::table::PlantParameters;
 use crate::units::{MICRO, Participation, State};
 
-/// Terms of the exponential series. The coefficients' scaled norm is below 1, so the remainder is below 1/17!.
+/// Terms of the exponential series. The coefficients' scaled norm is below 1, so the remainder is
+/// below 1/17!.
 const SERIES_TERMS: u32 = 16;
 /// Chain states g, l, p, then the input's value and its slope over the tick.
 const AUGMENTED: usize = 5;
@@ -43,7 +47,8 @@ pub struct ObserverConfig {
 /// Why no observer can be made.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum ObserverError {
-    /// A time constant of the chain is zero or below a quarter of a tick, which the series does not cover.
+    /// A time constant of the chain is zero or below a quarter of a tick, which the series does not
+    /// cover.
     TimeConstantTooShort,
 }
 
@@ -128,7 +133,8 @@ pub struct Observer {
 }
 
 impl Observer {
-    /// An observer at rest at a frequency deviation \[µHz\]: the chain in its steady state g = l = p = K f.
+    /// An observer at rest at a frequency deviation \[µHz\]: the chain in its steady state g = l =
+    /// p = K f.
     pub fn at_rest(config: ObserverConfig, plant: &PlantParameters, f_uhz: i32) -> Self {
         let f_hz = f_uhz as f32 / MICRO as f32;
         let rest = plant.governor_gain_kw_per_hz as f32 / MICRO as f32 * f_hz;
@@ -161,8 +167,8 @@ impl Observer {
         self.estimate(f_uhz)
     }
 
-    /// The lost power \[kW\], once a tick after [`Observer::step`]: `fleet` is the participation in force during the tick
-    /// that ended. `None` until [`loss::WINDOW_TICKS`] ticks have been seen.
+    /// The lost power \[kW\], once a tick after [`Observer::step`]: `fleet` is the participation in
+    /// force during the tick that ended. `None` until [`loss::WINDOW_TICKS`] ticks have been seen.
     pub fn loss_kw(&mut self, fleet: Participation) -> Option<i32> {
         let [_, _, p] = self.chain;
         let fleet_gw = fleet.ppm() as f32 * self.config.fleet_gw_per_ppm;
@@ -191,8 +197,8 @@ mod tests {
 
     const TICK_MS: u16 = 100;
 
-    /// Noise in -eps..=eps from a small generator; the worst case for a filter is a slow square wave, so `hold` ticks
-    /// share a value.
+    /// Noise in -eps..=eps from a small generator; the worst case for a filter is a slow square
+    /// wave, so `hold` ticks share a value.
     fn noise(seed: &mut u64, eps: i32) -> i32 {
         *seed = seed
             .wrapping_mul(6_364_136_223_846_793_005)
@@ -224,8 +230,9 @@ mod tests {
         ) {
             let config = ObserverConfig::new(&PlantParameters::PAPER, TICK_MS).expect("the paper's chain");
             let mut observer = Observer::at_rest(config, &PlantParameters::PAPER, 0);
-            // The fleet may step by all of its power at any tick, the loss at the first: both at ticks, so f' bends
-            // nowhere inside one. Imbalance and |l - p| below 4 GW in every such run.
+            // The fleet may step by all of its power at any tick, the loss at the first: both at
+            // ticks, so f' bends nowhere inside one. Imbalance and |l - p| below 4 GW in every such
+            // run.
             let input = InputError {
                 reading_uhz: eps as u32 + 1,
                 curvature_uhz_per_s2: InputError::curvature_uhz_per_s2(&PlantParameters::PAPER, 4_000_000, 4_000_000),
@@ -292,7 +299,8 @@ mod tests {
 
     #[test]
     fn a_constant_bias_is_a_shift_of_the_loss() {
-        // x + b (1, K, K, K) with the loss shifted by (D - K) b: the observer cannot tell the two apart.
+        // x + b (1, K, K, K) with the loss shifted by (D - K) b: the observer cannot tell the two
+        // apart.
         let config =
             ObserverConfig::new(&PlantParameters::PAPER, TICK_MS).expect("the paper's chain");
         let bias = 5_000;

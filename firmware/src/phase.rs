@@ -10,9 +10,9 @@
 //! | Fixed | f in I2; the last participation is held | every tick |
 //! | Hold | with `stay`: the state is in the safety law's domain | every period, counted from the switch |
 //!
-//! A *decision* tries the laws in the order Hold, Fixed, C2, C1 and takes the first that applies and has an entry for
-//! the cell. With none, the answer is [`Step::Outside`] and the next tick decides again: the caller runs the baseline
-//! droop meanwhile.
+//! A *decision* tries the laws in the order Hold, Fixed, C2, C1 and takes the first that applies
+//! and has an entry for the cell. With none, the answer is [`Step::Outside`] and the next tick
+//! decides again: the caller runs the baseline droop meanwhile.
 
 use crate::table::{Law, TableView};
 use crate::units::State;
@@ -80,7 +80,8 @@ pub struct PhaseState {
     pub phase: Phase,
     /// Input level held since the last decision.
     pub level: u8,
-    /// Ticks until the next decision; 0 decides at the next tick. Always 0 in No control, Fixed and Fallback.
+    /// Ticks until the next decision; 0 decides at the next tick. Always 0 in No control, Fixed and
+    /// Fallback.
     pub ticks_left: u16,
 }
 
@@ -92,14 +93,15 @@ impl PhaseState {
         ticks_left: 0,
     };
 
-    /// Advances by one tick with the state measured at it; pure, so that the verifier can call it on any state.
+    /// Advances by one tick with the state measured at it; pure, so that the verifier can call it
+    /// on any state.
     #[must_use]
     pub fn step(self, table: &TableView<'_>, state: State) -> (Self, Step) {
         self.step_ahead(table, state, || state)
     }
 
-    /// The same where commands act with a delay. No control watches the `measured` state. Every other
-    /// phase and every decision go by the state `ahead`, in which the command begins to act
+    /// The same where commands act with a delay. No control watches the `measured` state. Every
+    /// other phase and every decision go by the state `ahead`, in which the command begins to act
     /// ([`crate::prediction`]). `ahead` is called only if the tick needs it.
     #[must_use]
     pub fn step_ahead(

@@ -1,24 +1,26 @@
 //! What the grid will be when a command begins to act.
 //!
-//! The fleet answers a whole number n of ticks late. A command that is decided now acts on the state in
-//! n ticks. Once the event has begun, phase machine and lookup run on that state:
+//! The fleet answers a whole number n of ticks late. A command that is decided now acts on the
+//! state in n ticks. Once the event has begun, phase machine and lookup run on that state:
 //!
 //! ```text
 //! x̂(t + δ) = Φ_δ x̂(t) + Σ_j G_j u(t - j tick) + W        j = 1..=n,  δ = n tick
 //! ```
 //!
-//! u(t - j tick) are the levels that are under way. G_j is what a level of j ticks ago adds until t + δ:
-//! `exp(A (j-1) tick)` times the response to a tick of one level. W is what the expected loss adds (the
-//! middle of its band). Nothing is fed back, so no error of one tick lives longer than δ.
+//! u(t - j tick) are the levels that are under way. G_j is what a level of j ticks ago adds until
+//! t + δ, which is `exp(A (j-1) tick)` times the response to a tick of one level. W is what the
+//! expected loss adds (the middle of its band). Nothing is fed back, so no error of one tick lives
+//! longer than δ.
 //!
 //! **Numbers.** The coefficients are the table's. The device multiplies and adds them in 64-bit
-//! integers, so host and device agree to the bit. Φ has [`PHI_FRACTION_BITS`] fractional bits, G has
-//! [`RESPONSE_FRACTION_BITS`] of a micro-unit, W has none. The sum is exact and is floored once.
+//! integers, so host and device agree to the bit. Φ has [`PHI_FRACTION_BITS`] fractional bits, G
+//! has [`RESPONSE_FRACTION_BITS`] of a micro-unit, W has none. The sum is exact and is floored
+//! once.
 //!
-//! With coefficients rounded to the nearest, the result errs by at most the sum of `2^-25 Σ|x̂_e|` for
-//! Φ, `2^-9` micro-units for every level under way, half a micro-unit for W, and `Σ|Φ_de|` for the floor
-//! of the measured state. The final floor moves no state across a cell edge, for edges are whole
-//! micro-units.
+//! With coefficients rounded to the nearest, the result errs by at most the sum of `2^-25 Σ|x̂_e|`
+//! for Φ, `2^-9` micro-units for every level under way, half a micro-unit for W, and `Σ|Φ_de|` for
+//! the floor of the measured state. The final floor moves no state across a cell edge, for edges
+//! are whole micro-units.
 //!
 //! Measured states are clamped to ±2^29 micro-units (±536 Hz or GW), so no sum can overflow:
 //! 4 · 2^29 · 2^31 + 2^31 · 2^24 + 64 · 2^31 · 31 · 2^16 < 2^63.
@@ -37,7 +39,8 @@ pub const DELAY_TICKS_MAX: u16 = 64;
 pub const PHI_FRACTION_BITS: u32 = 24;
 /// Fractional bits of G.
 pub const RESPONSE_FRACTION_BITS: u32 = 8;
-/// Largest magnitude of a measured state that is predicted from; larger ones are clamped \[micro-units\].
+/// Largest magnitude of a measured state that is predicted from; larger ones are clamped
+/// \[micro-units\].
 pub const MEASURED_MAX: i32 = 1 << 29;
 /// Levels that [`History`] can tell apart; a table has no more.
 pub const LEVELS_KEPT: u8 = 1 << LEVEL_BITS;
@@ -50,7 +53,8 @@ const LOSS_AT: usize = WORD * STATES * STATES;
 /// Offset of G_1.
 const LEVELS_AT: usize = LOSS_AT + WORD * STATES;
 
-/// Bytes of the prediction part of a table whose commands act so many ticks late; none without a delay.
+/// Bytes of the prediction part of a table whose commands act so many ticks late; none without a
+/// delay.
 pub const fn prediction_len(delay_ticks: u16) -> usize {
     if delay_ticks == 0 {
         return 0;
@@ -60,8 +64,8 @@ pub const fn prediction_len(delay_ticks: u16) -> usize {
 
 /// The levels of the last 64 ticks: 40 bytes.
 ///
-/// A plane holds one bit of every level in two words, the later ticks first: bit j of plane b is bit b
-/// of the level of j + 1 ticks ago.
+/// A plane holds one bit of every level in two words, the later ticks first: bit j of plane b is
+/// bit b of the level of j + 1 ticks ago.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct History {
     planes: [[u32; 2]; LEVEL_BITS],
@@ -73,8 +77,8 @@ impl History {
         planes: [[0; 2]; LEVEL_BITS],
     };
 
-    /// Notes the level that a tick has decided; from then on it is that of one tick ago. Bits past the
-    /// fifth are lost.
+    /// Notes the level that a tick has decided; from then on it is that of one tick ago. Bits past
+    /// the fifth are lost.
     #[inline(never)]
     pub fn push(&mut self, level: u8) {
         let mut level = level;
@@ -112,7 +116,8 @@ impl<'t> PredictionView<'t> {
         }
     }
 
-    /// Φ from a state (column) to a state (row), with [`PHI_FRACTION_BITS`] fractional bits; 0 past the last.
+    /// Φ from a state (column) to a state (row), with [`PHI_FRACTION_BITS`] fractional bits; 0 past
+    /// the last.
     pub fn phi(&self, row: usize, column: usize) -> i32 {
         self.word(STATES * row + column)
     }
@@ -133,8 +138,8 @@ impl<'t> PredictionView<'t> {
         self.words.len().saturating_sub(LEVELS_AT / WORD) / STATES
     }
 
-    /// The state in n ticks, from what is measured now and what is under way. What does not fit becomes
-    /// `i32::MAX`, which lies in no grid.
+    /// The state in n ticks, from what is measured now and what is under way. What does not fit
+    /// becomes `i32::MAX`, which lies in no grid.
     #[must_use]
     #[inline(never)]
     pub fn predict(&self, measured: State, history: &History) -> State {

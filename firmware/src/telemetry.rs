@@ -1,8 +1,8 @@
 //! Telemetry: one frame a tick, over any serial line.
 //!
-//! A frame is a postcard record ([`Frame`]), four bytes of CRC-32 over the record, COBS over both and a zero byte as the
-//! delimiter. `docs/telemetry.md` is the schema. The first byte of the record is its version: a reader that does not know
-//! it skips the frame.
+//! A frame is a postcard record ([`Frame`]), four bytes of CRC-32 over the record, COBS over both
+//! and a zero byte as the delimiter. `docs/telemetry.md` is the schema. The first byte of the
+//! record is its version: a reader that does not know it skips the frame.
 
 use serde::{Deserialize, Serialize};
 
@@ -142,7 +142,8 @@ pub fn encode<'b>(frame: &Frame, buffer: &'b mut [u8; FRAME_MAX]) -> &'b [u8] {
     buffer.get(..=written).unwrap_or_default()
 }
 
-/// The frame of a stretch of bytes up to a delimiter (with or without it); the bytes are overwritten.
+/// The frame of a stretch of bytes up to a delimiter (with or without it); the bytes are
+/// overwritten.
 ///
 /// # Errors
 /// Bytes that [`encode`] did not write.
@@ -189,7 +190,8 @@ mod tests {
 
     #[test]
     fn golden_bytes() {
-        // Zigzag varints: -150 000 is 299 999 = 0xDF 0xA7 0x12; 6 000 is 0xF0 0x2E; 300 is 0xAC 0x02; 0x81 is 0x81 0x01.
+        // Zigzag varints: -150 000 is 299 999 = 0xDF 0xA7 0x12; 6 000 is 0xF0 0x2E; 300 is 0xAC
+        // 0x02; 0x81 is 0x81 0x01.
         let record = [
             1, 1, 100, 1, 2, 0xDF, 0xA7, 0x12, 0, 2, 1, 1, 4, 0xAC, 0x02, 2, 0xF0, 0x2E, 0x81,
             0x01, 0,

@@ -1,8 +1,9 @@
 //! Quantities as integers in micro-units: frequency in µHz, power in kW (which is µGW), time in µs.
 //!
-//! The grid model works in Hz and GW; one micro-unit is 1e-6 of either. A state variable is stored as the *floor* of its
-//! value in micro-units. Cell edges are whole micro-units too, so flooring never moves a state across an edge: the real
-//! value lies in a half-open cell exactly when the stored integer does.
+//! The grid model works in Hz and GW; one micro-unit is 1e-6 of either. A state variable is stored
+//! as the *floor* of its value in micro-units. Cell edges are whole micro-units too, so flooring
+//! never moves a state across an edge: the real value lies in a half-open cell exactly when the
+//! stored integer does.
 
 /// Number of state variables.
 pub const STATES: usize = 4;
@@ -63,8 +64,8 @@ pub struct Band {
 }
 
 impl Band {
-    /// Whether the stored frequency lies in the band. The stored integer is the floor of the real frequency, so at the
-    /// upper end the real one may be up to 1 µHz above it.
+    /// Whether the stored frequency lies in the band. The stored integer is the floor of the real
+    /// frequency, so at the upper end the real one may be up to 1 µHz above it.
     pub const fn contains(self, state: State) -> bool {
         let f = state.frequency_uhz();
         self.low_uhz <= f && f <= self.high_uhz

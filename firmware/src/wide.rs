@@ -1,9 +1,11 @@
 //! Quotients of 64 bits by 32, for processors that divide 32 bits.
 //!
-//! The compiler's own routine divides any two 64-bit numbers and takes a kilobyte of flash. Everything that the charger
-//! divides has a divisor of 32 bits and a quotient that fits 32 bits or saturates.
+//! The compiler's own routine divides any two 64-bit numbers and takes a kilobyte of flash.
+//! Everything that the charger divides has a divisor of 32 bits and a quotient that fits 32 bits or
+//! saturates.
 
-/// `numerator / divisor`, rounded down; `u32::MAX` for what does not fit 32 bits, and for a divisor of zero.
+/// `numerator / divisor`, rounded down; `u32::MAX` for what does not fit 32 bits, and for a divisor
+/// of zero.
 ///
 /// By hand as at school, with two digits of 16 bits.
 #[inline(never)]
@@ -25,8 +27,8 @@ pub(crate) const fn divide(numerator: u64, divisor: u32) -> u32 {
     first << 16 | second
 }
 
-/// The digit `(rest · 2^16 + next) / divisor` and what remains, for a `rest` below the divisor, whose highest bit is set,
-/// and a `next` below 2^16.
+/// The digit `(rest · 2^16 + next) / divisor` and what remains, for a `rest` below the divisor,
+/// whose highest bit is set, and a `next` below 2^16.
 #[inline(always)]
 const fn digit(rest: u32, next: u32, divisor: u32) -> (u32, u32) {
     let (upper, lower) = (divisor >> 16 | 1 << 15, divisor & 0xFFFF);

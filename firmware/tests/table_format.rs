@@ -1,4 +1,5 @@
-//! The table format: bytes written by hand, every way in which an image can be wrong, and total lookups.
+//! The table format: bytes written by hand, every way in which an image can be wrong, and total
+//! lookups.
 #![allow(
     clippy::unwrap_used,
     clippy::expect_used,
@@ -13,10 +14,11 @@ use firmware::phase::Phase;
 use firmware::prediction::{History, prediction_len};
 use firmware::table::field::{Field, entry};
 use firmware::table::*;
-use firmware::units::{Band, State};
+use firmware::units::{Band, Participation, State};
 use proptest::prelude::*;
 
-/// A tree over 4 x 3 x 2 x 2 cells: f below 2 gives level 1; else g below 1 gives level 2, else the piece.
+/// A tree over 4 x 3 x 2 x 2 cells: f below 2 gives level 1; else g below 1 gives level 2, else the
+/// piece.
 const TREE: [u8; 18] = [
     0x01, // one affine piece
     0x00, 0x04, 0x00, 0x00, 0x00, 0x00, 0x00,
@@ -149,7 +151,8 @@ fn header_bytes_are_as_documented() {
     );
 }
 
-/// The image with commands that act a tick late: Φ the identity but f falls by g/2; W = 7 on l; G_1 = 256 g a level.
+/// The image with commands that act a tick late: Φ the identity but f falls by g/2; W = 7 on l; G_1
+/// = 256 g a level.
 fn delayed() -> Vec<u8> {
     let mut words = [0i32; 24];
     for axis in 0..4 {
@@ -205,11 +208,13 @@ fn a_delayed_loop_watches_what_is_and_decides_on_what_will_be() {
     // I1 ends at -300 000: that f is measured, whatever is predicted.
     let calm = control.step(State([-300_000, 500_000, 0, 5]));
     assert_eq!(calm.phase, Phase::NoControl);
-    // Predicted (-1, 0, 7, 5) has no law, so the droop answers, in whole levels: 0.3 Hz is 150 mHz of 500, 6 levels, of which 3 exist.
+    // Predicted (-1, 0, 7, 5) has no law, so the droop answers, in whole levels: 0.3 Hz is 150 mHz
+    // of 500, 6 levels, of which 3 exist.
     let outside = control.step(State([-300_001, -600_000, 0, 5]));
     assert_eq!(outside.source, Source::DroopOutside);
     assert_eq!(outside.participation.ppm(), 150_000);
-    // The three levels under way add 768 to g: predicted (-3, 0, 0, 13) is cell (0, 1, 0, 1), inside C1 by the hull, level 1.
+    // The three levels under way add 768 to g: predicted (-3, 0, 0, 13) is cell (0, 1, 0, 1),
+    // inside C1 by the hull, level 1.
     let ahead = control.step(State([-3 - 384, -768, -7, 13]));
     assert_eq!((ahead.phase, ahead.source), (Phase::C1, Source::Table));
     assert_eq!(ahead.participation.ppm(), 50_000);
@@ -225,6 +230,25 @@ fn a_delayed_loop_watches_what_is_and_decides_on_what_will_be() {
     // Forgotten: without the 256, g lies below the grid.
     let forgotten = control.step(State([-300_001, -256, -7, 13]));
     assert_eq!(forgotten.source, Source::DroopOutside);
+}
+
+#[test]
+fn a_caller_that_overrules_the_loop_is_what_is_under_way() {
+    let image = delayed();
+    let mut control = ControlLoop::new(&image);
+    let outside = State([-300_001, -600_000, 0, 5]);
+    let overruled = control.step_or(outside, |action| {
+        assert_eq!(action.source, Source::DroopOutside);
+        Participation::NONE
+    });
+    assert_eq!(overruled.participation, Participation::NONE);
+    // Nothing is under way: predicted (-3, 0, 0, 13), inside C1. The droop's three levels would
+    // have added 768 to g, which lies above the grid.
+    let next = control.step(State([-3, 0, -7, 13]));
+    assert_eq!((next.phase, next.source), (Phase::C1, Source::Table));
+    // A tick at which the loop is not asked: 70 000 ppm is nearest to one level.
+    let commanded = control.command(Participation::from_ppm(70_000));
+    assert_eq!(commanded.ppm(), 50_000);
 }
 
 #[test]
@@ -486,7 +510,8 @@ fn blocks_are_refused_for_their_own_reasons() {
     );
 }
 
-/// One look-ahead: f rises by two cells a step for at most three steps, until it is in 6..=7; g must not pass 2.
+/// One look-ahead: f rises by two cells a step for at most three steps, until it is in 6..=7; g
+/// must not pass 2.
 const LOOK_AHEAD: [u8; 76] = [
     0x00, 0x00, 0x01, // no half-space, no hull, one look-ahead
     0x04, 0x03, 0x00, 0x00, // four fractional bits, three steps
@@ -669,7 +694,8 @@ proptest! {
         let _ = TableView::parse(&bytes);
     }
 
-    /// Blocks of arbitrary bytes under a valid frame: most are refused, and those that are not answer every lookup.
+    /// Blocks of arbitrary bytes under a valid frame: most are refused, and those that are not
+    /// answer every lookup.
     #[test]
     fn arbitrary_blocks_never_panic(
         domain in proptest::collection::vec(any::<u8>(), 0..40),

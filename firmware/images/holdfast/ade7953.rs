@@ -1,4 +1,5 @@
-//! Frequency from an ADE7953 metering chip on SPI1: PA4 chip select, PA5 SCLK, PA6 MISO, PA7 MOSI, mode 3.
+//! Frequency from an ADE7953 metering chip on SPI1: PA4 chip select, PA5 SCLK, PA6 MISO, PA7 MOSI,
+//! mode 3.
 
 use embedded_hal::spi::{ErrorType, MODE_3, Operation, SpiDevice};
 use firmware::frequency::ade7953::{Ade7953, Spi};
@@ -10,9 +11,11 @@ use stm32f4xx_hal::spi;
 
 use super::CORE_MHZ;
 
-/// Clock of the bus \[kHz\]: the chip takes up to 5 MHz; slow enough for pins at their lowest slew rate.
+/// Clock of the bus \[kHz\]: the chip takes up to 5 MHz; slow enough for pins at their lowest slew
+/// rate.
 const BUS_KHZ: u32 = 1_000;
-/// Longest time from chip select to the first edge, and from the last edge to release, that is waited \[µs\].
+/// Longest time from chip select to the first edge, and from the last edge to release, that is
+/// waited \[µs\].
 const SETTLE_US: u32 = 2;
 
 /// The chip on its bus, alone: a frame is what is transferred while it is selected.

@@ -1,4 +1,5 @@
-//! A unidirectional charger: the control pilot on PA8 (TIM1 channel 1, 1 kHz), the contactor on PB0, high closes.
+//! A unidirectional charger: the control pilot on PA8 (TIM1 channel 1, 1 kHz), the contactor on
+//! PB0, high closes.
 
 use firmware::dispatch::contactor::ContactorTimes;
 use firmware::dispatch::fleet::Threshold;

@@ -1,5 +1,5 @@
-//! A bidirectional charger: the signed power set-point as the duty of PA8 (TIM1 channel 1, 1 kHz); PB0 is not used, for
-//! the power stage has a contactor of its own.
+//! A bidirectional charger: the signed power set-point as the duty of PA8 (TIM1 channel 1, 1 kHz);
+//! PB0 is not used, for the power stage has a contactor of its own.
 
 use firmware::dispatch::bidirectional::Bidirectional;
 use firmware::dispatch::power_line::PowerLine;
@@ -12,11 +12,12 @@ use stm32f4xx_hal::timer::Timer;
 
 /// Carrier of the set-point \[Hz\].
 const LINE_HZ: u32 = 1_000;
-/// What the line's 10 % and 90 % stand for, and the power stage's limit in both directions \[W\]: the paper's swing of
-/// 56 kW.
+/// What the line's 10 % and 90 % stand for, and the power stage's limit in both directions \[W\]:
+/// the paper's swing of 56 kW.
 const SPAN_W: u32 = 28_000;
 
-/// The charger's output. Every charger follows its share, so its place in the fleet does not matter.
+/// The charger's output. Every charger follows its share, so its place in the fleet does not
+/// matter.
 pub(crate) fn new(
     (timer, line, _coil): (TIM1, PA8, PB0),
     _serial: u32,

@@ -1,4 +1,5 @@
-//! Frequency from the zero crossings of the mains: rising edges on PA0, captured by TIM5 channel 1 in hardware.
+//! Frequency from the zero crossings of the mains: rising edges on PA0, captured by TIM5 channel 1
+//! in hardware.
 
 use firmware::frequency::zero_crossing::ZeroCrossing;
 use stm32f4xx_hal::gpio::PA0;
@@ -36,7 +37,8 @@ pub(crate) fn new((timer, pin): (TIM5, PA0), rcc: &mut Rcc) -> Option<(ZeroCross
 }
 
 impl Feed {
-    /// Hands over a crossing, if there was one; the loop comes round far more often than every 20 ms.
+    /// Hands over a crossing, if there was one; the loop comes round far more often than every 20
+    /// ms.
     pub(crate) fn poll(&mut self, window: &mut ZeroCrossing, now_ms: u32) {
         if self.timer.flags().contains(Flag::C1) {
             // Reading the capture register clears its flag.

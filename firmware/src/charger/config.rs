@@ -41,7 +41,8 @@ pub struct ChargerConfig {
 }
 
 impl ChargerConfig {
-    /// No filter, 1 s of hold at 100 ms a tick, release over 60 s, warm-up by the plant, [`EventEnd::DEFAULT`].
+    /// No filter, 1 s of hold at 100 ms a tick, release over 60 s, warm-up by the plant,
+    /// [`EventEnd::DEFAULT`].
     pub const DEFAULT: Self = Self {
         gate: GateLimits::DEFAULT,
         filter_ticks: 1,

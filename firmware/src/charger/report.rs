@@ -28,43 +28,76 @@ pub struct Report {
     pub faults: Faults,
 }
 
-impl Report {
+/// What stands until a tick changes it.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Standing {
+    /// Who decided.
+    pub(super) mode: Mode,
+    /// The law in force.
+    pub(super) phase: Phase,
+    /// State estimate.
+    pub(super) state: State,
+    /// Lost power \[kW\], once known.
+    pub(super) loss_kw: Option<i32>,
+    /// What is commanded.
+    pub(super) participation: Participation,
+}
+
+impl Standing {
     /// Before the first tick.
     pub(super) const FIRST: Self = Self {
-        sequence: 0,
-        now_ms: 0,
         mode: Mode::WarmUp,
         phase: Phase::NoControl,
         state: State([0; STATES]),
         loss_kw: None,
         participation: Participation::NONE,
-        set_point: None,
-        faults: Faults::NONE,
     };
 }
 
-/// Logs what a tick changed: the mode, and faults that came or went.
-#[cfg(feature = "defmt")]
-pub(super) fn log_changes(before: &Report, now: &Report) {
-    if now.mode != before.mode {
-        defmt::info!(
-            "tick {=u32}: {} -> {}, f {=i32} uHz",
-            now.sequence,
-            before.mode,
-            now.mode,
-            now.state.frequency_uhz()
-        );
-    }
-    for (fault, name) in Faults::NAMES {
-        if now.faults.without(before.faults).contains(fault) {
-            defmt::warn!("tick {=u32}: fault {=str}", now.sequence, name);
-        }
-        if before.faults.without(now.faults).contains(fault) {
-            defmt::info!("tick {=u32}: cleared {=str}", now.sequence, name);
-        }
-    }
+/// Logs what a tick changed: the mode, and faults that came or went. Without the `defmt` feature it
+/// is empty and logs nothing; telemetry carries the same.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct ChangeLog {
+    #[cfg(feature = "defmt")]
+    mode: Mode,
+    #[cfg(feature = "defmt")]
+    faults: Faults,
 }
 
-/// Without the `defmt` feature nothing is logged; telemetry carries the same.
-#[cfg(not(feature = "defmt"))]
-pub(super) fn log_changes(_before: &Report, _now: &Report) {}
+impl ChangeLog {
+    /// Before the first tick.
+    pub(super) const FIRST: Self = Self {
+        #[cfg(feature = "defmt")]
+        mode: Standing::FIRST.mode,
+        #[cfg(feature = "defmt")]
+        faults: Faults::NONE,
+    };
+
+    /// Logs what is new in a report.
+    #[cfg(feature = "defmt")]
+    pub(super) fn note(&mut self, now: &Report) {
+        if now.mode != self.mode {
+            defmt::info!(
+                "tick {=u32}: {} -> {}, f {=i32} uHz",
+                now.sequence,
+                self.mode,
+                now.mode,
+                now.state.frequency_uhz()
+            );
+        }
+        for (fault, name) in Faults::NAMES {
+            if now.faults.without(self.faults).contains(fault) {
+                defmt::warn!("tick {=u32}: fault {=str}", now.sequence, name);
+            }
+            if self.faults.without(now.faults).contains(fault) {
+                defmt::info!("tick {=u32}: cleared {=str}", now.sequence, name);
+            }
+        }
+        self.mode = now.mode;
+        self.faults = now.faults;
+    }
+
+    /// Logs nothing.
+    #[cfg(not(feature = "defmt"))]
+    pub(super) const fn note(&mut self, _now: &Report) {}
+}

@@ -1,8 +1,8 @@
 //! A charger that can discharge the car into the grid.
 //!
-//! Participation moves the power from what the charger draws without an event towards its discharge limit:
-//! `P = P_charge - u (P_charge + P_discharge)`, drawn from the grid positive. With equal limits of 28 kW that is the paper's
-//! swing of 56 kW.
+//! Participation moves the power from what the charger draws without an event towards its discharge
+//! limit: `P = P_charge - u (P_charge + P_discharge)`, drawn from the grid positive. With equal
+//! limits of 28 kW that is the paper's swing of 56 kW.
 
 use super::{Dispatch, DispatchError, LimitSource, Limits, SetPoint};
 use crate::units::{MICRO, Participation};
@@ -10,7 +10,8 @@ use crate::wide::divide;
 
 /// A power stage that follows a signed set-point.
 ///
-/// The implementation ramps and protects itself; it must accept every set-point within the limits it was built for.
+/// The implementation ramps and protects itself; it must accept every set-point within the limits
+/// it was built for.
 pub trait PowerStage {
     /// Why the stage refused.
     type Error;

@@ -1,8 +1,10 @@
-//! The contactor between mains and car: opened after a pause has lasted, and not closed again too soon.
+//! The contactor between mains and car: opened after a pause has lasted, and not closed again too
+//! soon.
 //!
-//! A relay wears with every operation, above all with those under load. So a pause is first signalled on the pilot, and
-//! the contactor opens only when the pause has lasted for `open_after_ms`, by when the car has stopped drawing current.
-//! Once open it stays open for `off_min_ms`.
+//! A relay wears with every operation, above all with those under load. So a pause is first
+//! signalled on the pilot, and the contactor opens only when the pause has lasted for
+//! `open_after_ms`, by when the car has stopped drawing current. Once open it stays open for
+//! `off_min_ms`.
 
 use embedded_hal::digital::OutputPin;
 
@@ -61,7 +63,8 @@ impl<O: OutputPin> Contactor<O> {
         let since = |since_ms: u32| now_ms.wrapping_sub(since_ms);
         let next = match (self.contact, connect) {
             (None | Some(Contact::Closed | Contact::Pausing { .. }), true) => Contact::Closed,
-            // The first request after a restart: the car may have been paused for any time, so open at once.
+            // The first request after a restart: the car may have been paused for any time, so open
+            // at once.
             (None, false) => Contact::Open { since_ms: now_ms },
             (Some(Contact::Closed), false) => Contact::Pausing { since_ms: now_ms },
             (Some(Contact::Pausing { since_ms }), false) => {

@@ -1,8 +1,9 @@
 //! This charger's place in the fleet.
 //!
-//! Currents below 6 A cannot be offered, so a charger that should draw less either draws 6 A or pauses. If each charger
-//! has its own threshold θ in [0, 1) and draws 6 A exactly when `θ < wanted / 6 A`, and the thresholds are spread evenly,
-//! the fleet's mean is what was wanted, without any communication.
+//! Currents below 6 A cannot be offered, so a charger that should draw less either draws 6 A or
+//! pauses. If each charger has its own threshold θ in [0, 1) and draws 6 A exactly when `θ < wanted
+//! / 6 A`, and the thresholds are spread evenly, the fleet's mean is what was wanted, without any
+//! communication.
 
 use crate::units::MICRO;
 
@@ -11,8 +12,9 @@ use crate::units::MICRO;
 pub struct Threshold(u32);
 
 impl Threshold {
-    /// The threshold of a serial number: multiples of the golden ratio modulo 1. Any run of N consecutive serial numbers
-    /// is spread so evenly that its share below any level is within about `log N / N` of that level.
+    /// The threshold of a serial number: multiples of the golden ratio modulo 1. Any run of N
+    /// consecutive serial numbers is spread so evenly that its share below any level is within
+    /// about `log N / N` of that level.
     pub const fn of_serial(serial: u32) -> Self {
         // 2^32 / golden ratio, odd.
         let spread = serial.wrapping_mul(0x9E37_79B9);
@@ -46,7 +48,8 @@ mod tests {
                 .filter(|n| Threshold::of_serial(17_000 + n).is_within(part, 6000))
                 .count() as f64;
             let wanted = f64::from(chargers) * f64::from(part) / 6000.0;
-            // Discrepancy of the golden-ratio sequence: N D < 1 + 0.7 log2 N, hence below 12 for N = 25 000.
+            // Discrepancy of the golden-ratio sequence: N D < 1 + 0.7 log2 N, hence below 12 for N
+            // = 25 000.
             assert!((within - wanted).abs() < 12.0, "{part}: {within} {wanted}");
         }
     }

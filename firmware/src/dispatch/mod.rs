@@ -1,8 +1,9 @@
 //! Participation to this charger's set-point.
 //!
-//! A participation u asks the fleet to give up the share u of what it can give up. A unidirectional charger lowers its
-//! current through the control pilot ([`unidirectional`]), a bidirectional one moves its power from charging towards
-//! discharging ([`bidirectional`], [`power_line`]). Limits from other sources (user, site, cable) are applied last and always win.
+//! A participation u asks the fleet to give up the share u of what it can give up. A unidirectional
+//! charger lowers its current through the control pilot ([`unidirectional`]), a bidirectional one
+//! moves its power from charging towards discharging ([`bidirectional`], [`power_line`]). Limits
+//! from other sources (user, site, cable) are applied last and always win.
 
 pub mod bidirectional;
 pub mod contactor;
@@ -83,8 +84,8 @@ impl Limits {
 
 /// A charger's way to follow the participation.
 ///
-/// The implementation applies its limits after the participation, and leaves the hardware in a state that no later
-/// failure can make worse: it lowers before it raises.
+/// The implementation applies its limits after the participation, and leaves the hardware in a
+/// state that no later failure can make worse: it lowers before it raises.
 pub trait Dispatch {
     /// Sets the hardware for this participation; `now_ms` is a monotonic clock that may wrap.
     ///

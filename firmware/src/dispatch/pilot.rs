@@ -7,8 +7,8 @@
 //! | 10 to 85 | 0.6 D |
 //! | 85 to 96 | 2.5 (D - 64) |
 //!
-//! Up to 52.5 A, where the upper line starts, 51 A is the most that a duty stands for. Every rounding is downwards, so that the
-//! current offered never exceeds the limit.
+//! Up to 52.5 A, where the upper line starts, 51 A is the most that a duty stands for. Every
+//! rounding is downwards, so that the current offered never exceeds the limit.
 
 use crate::wide::divide;
 
@@ -31,7 +31,8 @@ const _: () = assert!(LOWER_LINE_MAX_MA == 85 * 600);
 const _: () = assert!(CURRENT_MIN_MA == 10 * 600);
 const _: () = assert!(CURRENT_MAX_MA == (96 - 64) * 2_500);
 
-/// Duty for a current \[ppm of a period\], rounded down: the whole period (no charging) below 6 A, 96 % from 80 A.
+/// Duty for a current \[ppm of a period\], rounded down: the whole period (no charging) below 6 A,
+/// 96 % from 80 A.
 pub const fn duty_ppm(current_ma: u32) -> u32 {
     if current_ma < CURRENT_MIN_MA {
         WHOLE_PPM
@@ -71,8 +72,8 @@ impl<P: SetDutyCycle> Pilot<P> {
         Self { pwm }
     }
 
-    /// Offers a current \[mA\], no charging below 6 A. The duty is rounded down to a step of the timer, but not below the
-    /// duty of 6 A.
+    /// Offers a current \[mA\], no charging below 6 A. The duty is rounded down to a step of the
+    /// timer, but not below the duty of 6 A.
     ///
     /// # Errors
     /// That of the PWM channel.

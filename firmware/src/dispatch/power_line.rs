@@ -8,9 +8,10 @@
 //! | below 5 %, above 95 % | none: the line is not driven |
 //!
 //! ## Tradeoffs
-//! The ends are left free (a live zero, as in a 4 to 20 mA loop): a line that is cut, shorted, or dead because its
-//! controller restarts must not be read as full power in either direction. One line crosses an isolation barrier by one
-//! optocoupler. The power stage decodes linearly and must treat what it cannot read as no power.
+//! The ends are left free (a live zero, as in a 4 to 20 mA loop): a line that is cut, shorted, or
+//! dead because its controller restarts must not be read as full power in either direction. One
+//! line crosses an isolation barrier by one optocoupler. The power stage decodes linearly and must
+//! treat what it cannot read as no power.
 
 use crate::wide::divide;
 
@@ -28,7 +29,8 @@ pub struct PowerLine<P> {
 }
 
 impl<P: SetDutyCycle> PowerLine<P> {
-    /// A line whose 10 % and 90 % stand for `span_w`, which the power stage must know; 0 counts as 1 W.
+    /// A line whose 10 % and 90 % stand for `span_w`, which the power stage must know; 0 counts as
+    /// 1 W.
     pub const fn new(pwm: P, span_w: u32) -> Self {
         let span_w = match NonZeroU32::new(span_w) {
             Some(span_w) => span_w,
@@ -37,8 +39,8 @@ impl<P: SetDutyCycle> PowerLine<P> {
         Self { pwm, span_w }
     }
 
-    /// Duty of a power \[steps of the timer\]: rounded towards 50 %, so that the stage never reads more than was set, in
-    /// either direction. Powers past the span count as the span.
+    /// Duty of a power \[steps of the timer\]: rounded towards 50 %, so that the stage never reads
+    /// more than was set, in either direction. Powers past the span count as the span.
     fn steps(&self, power_w: i32, steps_max: u16) -> u16 {
         let power = power_w.unsigned_abs().min(self.span_w.get());
         // The span is 40 % = 2/5 of the period, and the power at most the span.
@@ -100,7 +102,8 @@ mod tests {
     }
 
     proptest! {
-        /// What the stage decodes is never past what was set, nor farther from it than the timer's steps explain.
+        /// What the stage decodes is never past what was set, nor farther from it than the timer's
+        /// steps explain.
         #[test]
         fn a_stage_never_reads_more(power in any::<i32>(), span in 1u32.., steps_max in 100u16..) {
             let mut mock = Mock::new(&[]);
@@ -110,7 +113,8 @@ mod tests {
             let (span, whole) = (f64::from(span), f64::from(steps_max));
             let wanted = f64::from(power).clamp(-span, span);
             let decoded = (f64::from(steps) / whole - 0.5) * span / 0.4;
-            // One step for the swing, half a step for the middle of an odd period; f64 is exact to 1e-16.
+            // One step for the swing, half a step for the middle of an odd period; f64 is exact to
+            // 1e-16.
             let step_w = span / (0.4 * whole);
             let exact = 1e-9 * span;
             prop_assert!((decoded - wanted).abs() <= 1.5 * step_w + exact);

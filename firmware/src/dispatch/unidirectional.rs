@@ -1,7 +1,8 @@
 //! A charger that can only lower its charging current.
 //!
-//! Wanted is `I_limit (1 - u)`, with the lowest of all limits as the charger's own share. From 6 A up it is offered as it
-//! is; below, the charger draws 6 A or pauses by its [`Threshold`], so that the fleet's mean is what was wanted.
+//! Wanted is `I_limit (1 - u)`, with the lowest of all limits as the charger's own share. From 6 A
+//! up it is offered as it is; below, the charger draws 6 A or pauses by its [`Threshold`], so that
+//! the fleet's mean is what was wanted.
 
 use embedded_hal::digital::OutputPin;
 use embedded_hal::pwm::SetDutyCycle;

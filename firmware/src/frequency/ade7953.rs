@@ -8,13 +8,15 @@
 //! | required setting | 0x120 | 16 | 0x0030: the data sheet's figures hold only with it |
 //!
 //! ## Bytes on the bus
-//! Addresses and data are most significant byte first. Over SPI (mode 3, one chip select for the whole frame) a frame is
-//! address (2), 0x80 for a read or 0x00 for a write (1), data. Over I2C the device is 0x38: a read writes the address and
-//! reads the data after a repeated start, a write carries address and data.
+//! Addresses and data are most significant byte first. Over SPI (mode 3, one chip select for the
+//! whole frame) a frame is address (2), 0x80 for a read or 0x00 for a write (1), data. Over I2C the
+//! device is 0x38: a read writes the address and reads the data after a repeated start, a write
+//! carries address and data.
 //!
 //! ## Tradeoffs
-//! One step of PERIOD is 11.2 mHz at 50 Hz: enough for the droop, coarse for a table whose spec allows 2 mHz of
-//! measurement error. Prefer [`super::zero_crossing`] on the chip's ZX output where a timer is free.
+//! One step of PERIOD is 11.2 mHz at 50 Hz: enough for the droop, coarse for a table whose spec
+//! allows 2 mHz of measurement error. Prefer [`super::zero_crossing`] on the chip's ZX output where
+//! a timer is free.
 
 use core::num::NonZeroU16;
 
@@ -41,12 +43,14 @@ pub const I2C_ADDRESS: u8 = 0x38;
 pub const PERIOD_CLOCK_HZ: u32 = 223_750;
 /// Counts in a nominal period, `PERIOD + 1`.
 const NOMINAL_COUNTS: u32 = PERIOD_CLOCK_HZ / NOMINAL_HZ;
-/// Readings in a row that may be equal \[ticks\]. On 9 August 2019 PERIOD would have stood still for 18 s at most.
+/// Readings in a row that may be equal \[ticks\]. On 9 August 2019 PERIOD would have stood still
+/// for 18 s at most.
 const STUCK_TICKS: u16 = 600;
 
 const _: () = assert!(NOMINAL_COUNTS == 4475);
 
-/// Access to the chip's registers. Errors carry nothing: the answer to each is the same, no reading this tick.
+/// Access to the chip's registers. Errors carry nothing: the answer to each is the same, no reading
+/// this tick.
 pub trait Registers {
     /// Writes an 8-bit register.
     ///
@@ -136,7 +140,8 @@ impl<B: I2c> Registers for TwoWire<B> {
 /// Deviation from nominal \[µHz\], rounded down, of a value of PERIOD.
 ///
 /// # Errors
-/// [`FrequencyError::NoSignal`] for 0 and 0xFFFF, which a chip without mains or a floating bus gives.
+/// [`FrequencyError::NoSignal`] for 0 and 0xFFFF, which a chip without mains or a floating bus
+/// gives.
 pub const fn deviation_uhz(period: u16) -> Result<i32, FrequencyError> {
     if period == 0 || period == u16::MAX {
         return Err(FrequencyError::NoSignal);

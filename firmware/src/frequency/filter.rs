@@ -1,8 +1,8 @@
 //! Moving average of the accepted readings.
 //!
-//! Over N ticks it lags a ramp by (N - 1)/2 ticks and divides independent noise by √N. N = 1 passes readings through,
-//! which is right for a source that averages over a tick itself (zero crossings over 100 ms): every tick of lag acts like
-//! a tick of actuation delay.
+//! Over N ticks it lags a ramp by (N - 1)/2 ticks and divides independent noise by √N. N = 1 passes
+//! readings through, which is right for a source that averages over a tick itself (zero crossings
+//! over 100 ms): every tick of lag acts like a tick of actuation delay.
 
 use crate::wide::divide;
 
@@ -30,7 +30,8 @@ impl Filter {
         self.ticks - 1
     }
 
-    /// Takes a deviation \[µHz\] and returns the mean of the last N, rounded down; of fewer while it fills.
+    /// Takes a deviation \[µHz\] and returns the mean of the last N, rounded down; of fewer while
+    /// it fills.
     pub fn step(&mut self, deviation_uhz: i32) -> i32 {
         if self.samples.len() >= self.ticks {
             let _oldest = self.samples.pop_front();

@@ -1,7 +1,8 @@
 //! Which readings are believed: range, age, change.
 //!
-//! The rate limit is against the last *accepted* reading and grows with the time since: a single spike is rejected, and
-//! a true jump (an island that reconnects, say) is believed again once the grid's inertia would have allowed it.
+//! The rate limit is against the last *accepted* reading and grows with the time since: a single
+//! spike is rejected, and a true jump (an island that reconnects, say) is believed again once the
+//! grid's inertia would have allowed it.
 
 use crate::wide::divide;
 
@@ -21,8 +22,9 @@ pub struct GateLimits {
 }
 
 impl GateLimits {
-    /// 45 to 55 Hz; 2 Hz/s, eight times the initial slope of the paper's event (2 GW / 2H = 0.25 Hz/s) and thirteen times
-    /// the steepest second of 9 August 2019 (0.151 Hz/s); readings of the last 250 ms.
+    /// 45 to 55 Hz; 2 Hz/s, eight times the initial slope of the paper's event (2 GW / 2H = 0.25
+    /// Hz/s) and thirteen times the steepest second of 9 August 2019 (0.151 Hz/s); readings of the
+    /// last 250 ms.
     pub const DEFAULT: Self = Self {
         range_uhz: 5_000_000,
         rate_uhz_per_s: 2_000_000,
@@ -35,7 +37,8 @@ impl GateLimits {
 pub struct Gate {
     limits: GateLimits,
     tick_ms: u16,
-    /// Bound on the source's own error; two readings may differ by twice that without a change of frequency.
+    /// Bound on the source's own error; two readings may differ by twice that without a change of
+    /// frequency.
     noise_uhz: u32,
     stuck_after: Option<NonZeroU16>,
     accepted: Option<i32>,

@@ -1,7 +1,8 @@
 //! Measured mains frequency: where it comes from and what is believed of it.
 //!
-//! A [`FrequencySource`] turns bytes on a bus or timer ticks into a [`Reading`]; the [`gate`] decides whether the reading
-//! is believed; the [`filter`] averages what was believed. Whatever is wrong with a reading is a [`FrequencyError`].
+//! A [`FrequencySource`] turns bytes on a bus or timer ticks into a [`Reading`]; the [`gate`]
+//! decides whether the reading is believed; the [`filter`] averages what was believed. Whatever is
+//! wrong with a reading is a [`FrequencyError`].
 
 pub mod ade7953;
 pub mod filter;
@@ -57,22 +58,25 @@ pub enum FrequencyError {
 
 /// A source of frequency readings.
 ///
-/// The implementation is responsible for decoding every possible byte or tick into a reading or an error, without
-/// panicking or blocking for longer than one bus transfer. The caller is responsible for polling once a tick and for
-/// judging the reading ([`gate::Gate`]).
+/// The implementation is responsible for decoding every possible byte or tick into a reading or an
+/// error, without panicking or blocking for longer than one bus transfer. The caller is responsible
+/// for polling once a tick and for judging the reading ([`gate::Gate`]).
 pub trait FrequencySource {
     /// Bound on a reading's error, lag apart \[µHz\]: resolution and clock tolerance.
     fn error_uhz(&self) -> u32;
 
-    /// Delay of the reading behind the frequency of this moment, for a ramp \[ms\]: half the averaging interval.
+    /// Delay of the reading behind the frequency of this moment, for a ramp \[ms\]: half the
+    /// averaging interval.
     fn lag_ms(&self) -> u16;
 
-    /// Ticks of unchanged readings after which the source is stuck; `None` for sources that may repeat themselves.
+    /// Ticks of unchanged readings after which the source is stuck; `None` for sources that may
+    /// repeat themselves.
     fn stuck_after(&self) -> Option<NonZeroU16>;
 
     /// The latest reading. `now_ms` is the caller's monotonic clock, which may wrap.
     ///
     /// # Errors
-    /// [`FrequencyError::Bus`], [`FrequencyError::NoSignal`] or [`FrequencyError::OutOfRange`]; the rest is the gate's.
+    /// [`FrequencyError::Bus`], [`FrequencyError::NoSignal`] or [`FrequencyError::OutOfRange`]; the
+    /// rest is the gate's.
     fn read(&mut self, now_ms: u32) -> Result<Reading, FrequencyError>;
 }

@@ -1,13 +1,15 @@
 //! Frequency from the timer ticks of mains zero crossings.
 //!
 //! ## Design
-//! A timer captures its counter at every positive-going crossing. The frequency is `cycles / (t_last - t_first)` over a
-//! window of whole cycles: crossings in between cancel out, and so does an offset of the comparator.
+//! A timer captures its counter at every positive-going crossing. The frequency is `cycles /
+//! (t_last - t_first)` over a window of whole cycles: crossings in between cancel out, and so does
+//! an offset of the comparator.
 //!
 //! ## Tradeoffs
-//! Five cycles at 50 Hz are 100 ms, one tick of the control loop. The reading lags by half the window (50 ms). One timer
-//! tick of uncertainty in the window is `f / (window in ticks)`: 0.5 mHz at 1 MHz, and a crystal of 20 ppm adds a constant
-//! 1 mHz. A crossing less than 1/55 s after the last is a glitch and ignored; more than 1/45 s restarts the window.
+//! Five cycles at 50 Hz are 100 ms, one tick of the control loop. The reading lags by half the
+//! window (50 ms). One timer tick of uncertainty in the window is `f / (window in ticks)`: 0.5 mHz
+//! at 1 MHz, and a crystal of 20 ppm adds a constant 1 mHz. A crossing less than 1/55 s after the
+//! last is a glitch and ignored; more than 1/45 s restarts the window.
 
 use core::num::NonZeroU16;
 
@@ -21,7 +23,8 @@ pub const CYCLES_MAX: usize = 16;
 pub const TIMER_HZ_MAX: u32 = 200_000_000;
 /// Slowest timer \[Hz\]: below, one timer tick is worth more than 50 mHz over one cycle.
 pub const TIMER_HZ_MIN: u32 = 50_000;
-/// Readings in a row that may be equal. A window of a real mains differs by timer ticks all the time.
+/// Readings in a row that may be equal. A window of a real mains differs by timer ticks all the
+/// time.
 const STUCK_TICKS: u16 = 100;
 
 const _: () = assert!(CYCLES_MAX as u64 * TIMER_HZ_MAX as u64 / 45 < u32::MAX as u64);
@@ -49,7 +52,8 @@ pub struct ZeroCrossing {
 }
 
 impl ZeroCrossing {
-    /// A window of `cycles` periods on a timer of this rate \[Hz\] whose clock is good to `clock_ppm`.
+    /// A window of `cycles` periods on a timer of this rate \[Hz\] whose clock is good to
+    /// `clock_ppm`.
     ///
     /// # Errors
     /// A rate or a number of cycles out of range.
@@ -200,7 +204,8 @@ mod tests {
             for stamp in all {
                 source.capture(stamp, stamp);
                 if let Ok(reading) = source.read(stamp) {
-                    // Each period is within [timer/55, timer/45] rounded down, so 45 Hz to 55 Hz and a rounding.
+                    // Each period is within [timer/55, timer/45] rounded down, so 45 Hz to 55 Hz
+                    // and a rounding.
                     prop_assert!(reading.deviation_uhz.abs() <= 5_004_000, "{reading:?}");
                 }
             }
@@ -217,7 +222,8 @@ mod tests {
             }
             let read = source.read(0).expect("a whole window").deviation_uhz;
             let truth = millihertz as i32 * 1000 - 50_000_000;
-            // The stated error is for 50 Hz; one timer tick is worth f²/(50·f0) of it at f, (54/50)² at most.
+            // The stated error is for 50 Hz; one timer tick is worth f²/(50·f0) of it at f,
+            // (54/50)² at most.
             let bound = source.error_uhz() * 117 / 100 + 1;
             prop_assert!(read.abs_diff(truth) <= bound, "{read} {truth}");
         }

@@ -1,8 +1,8 @@
 //! Processor in the loop: the host plays the mains, the processor plays the charger.
 //!
-//! Request and response travel in lock step as frames of two bytes of length (little-endian) and a postcard record. The
-//! [`session`] that answers is the same code in the Arm image and on the host, so comparing the two answers compares the
-//! two processors.
+//! Request and response travel in lock step as frames of two bytes of length (little-endian) and a
+//! postcard record. The [`session`] that answers is the same code in the Arm image and on the host,
+//! so comparing the two answers compares the two processors.
 
 pub mod session;
 
@@ -206,7 +206,8 @@ pub fn decode_frame<T: DeserializeOwned>(frame: &[u8]) -> Result<T, LinkError> {
     decode(record.get(..length).ok_or(LinkError::Truncated)?)
 }
 
-/// The bytes of a frame; empty if the record were longer than [`RECORD_MAX`], which none of this module is.
+/// The bytes of a frame; empty if the record were longer than [`RECORD_MAX`], which none of this
+/// module is.
 pub fn encode<'b, T: Serialize>(value: &T, buffer: &'b mut [u8; FRAME_MAX]) -> &'b [u8] {
     let Some((prefix, room)) = buffer.split_first_chunk_mut::<LENGTH_LEN>() else {
         return &[];

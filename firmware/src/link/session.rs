@@ -1,4 +1,5 @@
-//! The charger behind the link: every driver of the library over pins and buses that the host feeds and reads.
+//! The charger behind the link: every driver of the library over pins and buses that the host feeds
+//! and reads.
 
 use core::cell::Cell;
 use core::convert::Infallible;

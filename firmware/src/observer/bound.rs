@@ -1,27 +1,29 @@
 //! Bound on the state estimate's error, for the spec's `uncertainty.measurement`.
 //!
-//! The copy of the chain and the chain itself obey the same equations, so the error of (g, l, p) is the chain's response
-//! to the error of its input, `e_f(t) = f_measured - f`. For `|e_f| <= eps` it is at most `eps` times the L1 norm of
-//! the impulse response:
+//! The copy of the chain and the chain itself obey the same equations, so the error of (g, l, p) is
+//! the chain's response to the error of its input, `e_f(t) = f_measured - f`. For `|e_f| <= eps` it
+//! is at most `eps` times the L1 norm of the impulse response:
 //!
 //! - g: `K/(T_G s + 1)` has an impulse response of one sign, so the norm is the DC gain |K|.
-//! - l: the factor `(T_1 s + 1)/(T_2 s + 1)` has norm 1 for `T_1 <= T_2` and at most `2 T_1/T_2 - 1` above that (a direct
-//!   part `T_1/T_2` and a lag of gain `1 - T_1/T_2`). The same holds with T_G in T_2's place, so the larger of the two
-//!   counts: `|K| max(1, 2 T_1 / max(T_G, T_2) - 1)`. When `T_1` is at most one of them the whole response keeps its
-//!   sign, since lags in series do.
+//! - l: the factor `(T_1 s + 1)/(T_2 s + 1)` has norm 1 for `T_1 <= T_2` and at most `2 T_1/T_2 -
+//!   1` above that (a direct part `T_1/T_2` and a lag of gain `1 - T_1/T_2`). The same holds with
+//!   T_G in T_2's place, so the larger of the two counts: `|K| max(1, 2 T_1 / max(T_G, T_2) - 1)`.
+//!   When `T_1` is at most one of them the whole response keeps its sign, since lags in series do.
 //! - p: a further lag of gain 1 and one sign: as l.
 //!
 //! For the paper's plant, `T_1 = 2 < T_2 = 12`: 5 eps on each of the three.
 //!
-//! What `eps` must contain: the source's error ([`FrequencySource::error_uhz`](crate::frequency::FrequencySource)) and
-//! the interpolation between samples. The device takes f as linear over a tick h; with `|f''| <= c` the error is at most
-//! `c h²/8`. One step of power ΔP inside a tick bends f by `ΔP/2H` and adds `ΔP/2H · h/4`, for that tick only.
+//! What `eps` must contain: the source's error
+//! ([`FrequencySource::error_uhz`](crate::frequency::FrequencySource)) and the interpolation
+//! between samples. The device takes f as linear over a tick h; with `|f''| <= c` the error is at
+//! most `c h²/8`. One step of power ΔP inside a tick bends f by `ΔP/2H` and adds `ΔP/2H · h/4`, for
+//! that tick only.
 //!
 //! What it does not contain, and how to treat it:
 //! - a lag of the source delays the whole estimate: add it to `uncertainty.actuation_delay_s`;
-//! - a *constant* bias b is not an error in all directions: `x + b (1, K, K, K)` obeys the same plant with the loss
-//!   shifted by `(D - K) b` (6 b for the paper's plant). Put `(D - K) b` into `loss_gw`, shrink I2 by b, and count only
-//!   the rest of the error here;
+//! - a *constant* bias b is not an error in all directions: `x + b (1, K, K, K)` obeys the same
+//!   plant with the loss shifted by `(D - K) b` (6 b for the paper's plant). Put `(D - K) b` into
+//!   `loss_gw`, shrink I2 by b, and count only the rest of the error here;
 //! - an initial error of the chain dies out with the chain's slowest time constant: see
 //!   [`crate::charger::trust_ticks`];
 //! - wrong plant parameters.
@@ -44,8 +46,8 @@ pub struct InputError {
 }
 
 impl InputError {
-    /// A bound on |f''| for this plant: `2H f'' = p' + (P u)' - w' - D f'`, with u and w constant between steps,
-    /// `|p'| = |l - p|/T_t` and |f'| from the largest imbalance. Both powers in kW.
+    /// A bound on |f''| for this plant: `2H f'' = p' + (P u)' - w' - D f'`, with u and w constant
+    /// between steps, `|p'| = |l - p|/T_t` and |f'| from the largest imbalance. Both powers in kW.
     pub fn curvature_uhz_per_s2(
         plant: &PlantParameters,
         lag_gap_kw: u32,
@@ -72,7 +74,8 @@ impl InputError {
     }
 }
 
-/// Bound on |estimate - state| in each of (f, g, l, p), in micro-units: what goes into `uncertainty.measurement`.
+/// Bound on |estimate - state| in each of (f, g, l, p), in micro-units: what goes into
+/// `uncertainty.measurement`.
 ///
 /// f itself carries the reading's error alone: the interpolation matters to the chain only.
 pub fn measurement_bound(
@@ -109,7 +112,8 @@ mod tests {
             curvature_uhz_per_s2: 0,
             power_step_kw: 0,
         };
-        // 2 mHz, and a µHz for each of two terms rounded up: 5 * 2.002 mHz = 10.01 MW, and the f32 rounding.
+        // 2 mHz, and a µHz for each of two terms rounded up: 5 * 2.002 mHz = 10.01 MW, and the f32
+        // rounding.
         let bound = measurement_bound(&PlantParameters::PAPER, 100, &exact);
         assert_eq!(bound, [2_000, 10_110, 10_110, 10_110]);
     }

@@ -1,11 +1,13 @@
 //! The lost power w, estimated from what frequency, turbine and fleet did.
 //!
-//! `2H f' = p + P u - w - D f`, integrated over a window of W ticks of length h, needs no derivative:
+//! `2H f' = p + P u - w - D f`, integrated over a window of W ticks of length h, needs no
+//! derivative:
 //!
 //! `w = mean(p + P u - D f) - 2H (f_now - f_W_ticks_ago) / (W h)`
 //!
-//! with trapezoids for p and f, which are continuous, and the held value for u. For a constant w the estimate is exact up
-//! to the error bound of [`LossEstimator::error_kw`] once the window lies behind the onset: W h = 1 s.
+//! with trapezoids for p and f, which are continuous, and the held value for u. For a constant w
+//! the estimate is exact up to the error bound of [`LossEstimator::error_kw`] once the window lies
+//! behind the onset: W h = 1 s.
 
 use super::ObserverConfig;
 use crate::units::MICRO;
@@ -35,8 +37,8 @@ impl LossEstimator {
         last: None,
     };
 
-    /// Takes turbine power \[GW\] and frequency deviation \[Hz\] at this tick and the fleet's power during the tick that
-    /// ends now \[GW\]; the loss \[kW\] once the window is full.
+    /// Takes turbine power \[GW\] and frequency deviation \[Hz\] at this tick and the fleet's power
+    /// during the tick that ends now \[GW\]; the loss \[kW\] once the window is full.
     pub(super) fn step(
         &mut self,
         config: &ObserverConfig,
@@ -79,9 +81,10 @@ impl LossEstimator {
         *self = Self::EMPTY;
     }
 
-    /// Bound on the estimate's error for a constant loss \[kW\], from the error of a reading \[µHz\], that of p \[kW\] and
-    /// what the fleet may deliver more or less than commanded \[kW\]:
-    /// `2H · 2 eps / (W h) + D eps + e_p + e_fleet`, and the trapezoids' `h²/8` terms, below 1 MW for the paper's event.
+    /// Bound on the estimate's error for a constant loss \[kW\], from the error of a reading
+    /// \[µHz\], that of p \[kW\] and what the fleet may deliver more or less than commanded \[kW\]:
+    /// `2H · 2 eps / (W h) + D eps + e_p + e_fleet`, and the trapezoids' `h²/8` terms, below 1 MW
+    /// for the paper's event.
     pub fn error_kw(
         plant: &crate::table::PlantParameters,
         tick_ms: u16,

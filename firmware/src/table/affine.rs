@@ -1,13 +1,13 @@
-//! Integer affine functions of a cell: pieces that a leaf of an inputs tree names, and half-spaces of
-//! a domain.
+//! Integer affine functions of a cell: pieces that a leaf of an inputs tree names, and half-spaces
+//! of a domain.
 //!
 //! | offset | bytes | field |
 //! |---:|---:|---|
 //! | 0 | 4 × 2 | factor of each cell index, f g l p (i16) |
 //! | 8 | 4 | constant (i32) |
 //!
-//! The value is `constant + Σ factor·index`. The reader checks once that no cell of the grid takes a
-//! partial sum out of 32 bits; after that the arithmetic cannot overflow.
+//! The value is `constant + Σ factor·index`. The reader checks once that no cell of the grid takes
+//! a partial sum out of 32 bits; after that the arithmetic cannot overflow.
 
 use super::bytes::array_at;
 use crate::grid::{Cell, Grid};

@@ -130,7 +130,8 @@ impl<'t> DomainView<'t> {
         }
     }
 
-    /// Whether a cell of the grid with `count` cells is covered, and how many half-spaces and steps were visited.
+    /// Whether a cell of the grid with `count` cells is covered, and how many half-spaces and steps
+    /// were visited.
     #[inline]
     pub(super) fn contains(&self, cell: Cell, count: [u16; STATES]) -> (bool, u16) {
         let Self::Tree {

@@ -1,4 +1,5 @@
-//! One law of the table: a domain part that answers "is this cell covered", an inputs part that answers "which level".
+//! One law of the table: a domain part that answers "is this cell covered", an inputs part that
+//! answers "which level".
 
 use super::BlockError;
 use super::dense::DenseView;
@@ -10,7 +11,8 @@ use crate::units::STATES;
 
 /// What every encoding of a law's inputs can do.
 pub trait Encoding {
-    /// Input level at a cell, or `None` where the encoding has no entry. Total: any cell is allowed.
+    /// Input level at a cell, or `None` where the encoding has no entry. Total: any cell is
+    /// allowed.
     fn level(&self, cell: Cell) -> Option<u8>;
 
     /// Entries or nodes that this lookup visits.

@@ -1,9 +1,10 @@
 //! Look-ahead: is a cell covered, by where a held input would take it?
 //!
-//! Past one step ahead the edge of a winning set is ragged, because every step of the abstraction rounds to whole cells.
-//! A look-ahead rounds in the same way: it holds one input (the strongest or none) and follows the *near* corner of the
-//! successor boxes, the one that comes closest to a limit, and beside it the *far* bounds of g, l and p, step by step, in
-//! whole cells. The cell is covered if f comes into a band before a bound leaves its range, or if the steps run out.
+//! Past one step ahead the edge of a winning set is ragged, because every step of the abstraction
+//! rounds to whole cells. A look-ahead rounds in the same way: it holds one input (the strongest or
+//! none) and follows the *near* corner of the successor boxes, the one that comes closest to a
+//! limit, and beside it the *far* bounds of g, l and p, step by step, in whole cells. The cell is
+//! covered if f comes into a band before a bound leaves its range, or if the steps run out.
 //!
 //! | offset | bytes | field |
 //! |---:|---:|---|
@@ -21,11 +22,11 @@
 //! far'_d  = floor((Σ_j F_dj near_j + Σ_{g <= j <= d} F_dj (far_j - near_j) + b_d) / 2^s)
 //! ```
 //!
-//! Both begin at the cell's indices, of which f must lie in its range already. After each step g, l and p must lie on the
-//! grid.
+//! Both begin at the cell's indices, of which f must lie in its range already. After each step g, l
+//! and p must lie on the grid.
 //!
-//! The device trusts it no further than any other byte of the table: whether the answers are right is for the generator
-//! and the verifier, which ask for every cell.
+//! The device trusts it no further than any other byte of the table: whether the answers are right
+//! is for the generator and the verifier, which ask for every cell.
 
 use core::hint::black_box;
 
@@ -109,7 +110,8 @@ impl LookAhead {
         sound.then_some(found)
     }
 
-    /// Whether the look-ahead of these bytes covers a cell of its grid with `count` cells. It must fit the grid.
+    /// Whether the look-ahead of these bytes covers a cell of its grid with `count` cells. It must
+    /// fit the grid.
     #[inline]
     pub fn covers(bytes: &[u8; LOOK_AHEAD_LEN], cell: Cell, count: [u16; STATES]) -> bool {
         covers(bytes, cell, count).0
@@ -132,8 +134,8 @@ impl LookAhead {
     }
 }
 
-/// Runs a look-ahead that was read and fits, from a cell of its grid with `count` cells: whether the cell is covered, and
-/// the steps taken.
+/// Runs a look-ahead that was read and fits, from a cell of its grid with `count` cells: whether
+/// the cell is covered, and the steps taken.
 ///
 /// Written over the bytes as they lie in flash, with every index known when it is compiled.
 #[inline]
@@ -151,7 +153,8 @@ pub(super) fn covers(
     }
     let steps = u16::from(bytes[1]);
     for step in 0..steps {
-        // Read anew at every step: kept over the steps, the factors would only go from flash to the stack.
+        // Read anew at every step: kept over the steps, the factors would only go from flash to the
+        // stack.
         let bytes = black_box(bytes);
         if within(f, bytes, DONE_AT) {
             return (true, step);
@@ -161,7 +164,8 @@ pub(super) fn covers(
             let at = FACTORS_AT + 2 * (STATES * d + j);
             i32::from(i16::from_le_bytes([bytes[at], bytes[at + 1]]))
         };
-        // Sums cannot overflow while the bounds are on the grid, which `fits` checked; wrapping says so to the compiler.
+        // Sums cannot overflow while the bounds are on the grid, which `fits` checked; wrapping
+        // says so to the compiler.
         let sum = |d: usize| {
             factor(d, 0)
                 .wrapping_mul(f)
@@ -366,7 +370,8 @@ mod tests {
             prop_assert!(steps <= u16::from(ahead.steps));
         }
 
-        /// A contraction stays on the grid for many steps, so that later steps are compared as well.
+        /// A contraction stays on the grid for many steps, so that later steps are compared as
+        /// well.
         #[test]
         fn agrees_over_many_steps(
             cell in proptest::array::uniform4(0u16..30), near in proptest::array::uniform4(0i32..60_000),

@@ -1,10 +1,12 @@
-//! The flash image: a header, the coefficients of the prediction if commands act with a delay, one block per law, a CRC.
+//! The flash image: a header, the coefficients of the prediction if commands act with a delay, one
+//! block per law, a CRC.
 //!
-//! Reader ([`TableView`]) and writer ([`write`]) of the format live here, so that they cannot drift apart;
-//! `docs/table-format.md` gives the same bytes in prose. All integers are little-endian.
+//! Reader ([`TableView`]) and writer ([`write`]) of the format live here, so that they cannot drift
+//! apart; `docs/table-format.md` gives the same bytes in prose. All integers are little-endian.
 //!
-//! The image is checked once, by [`TableView::parse`]. After that every lookup is total: it ends within the bound of the
-//! law's directory entry, reads only inside its block and answers `None` for a cell that the law does not cover.
+//! The image is checked once, by [`TableView::parse`]. After that every lookup is total: it ends
+//! within the bound of the law's directory entry, reads only inside its block and answers `None`
+//! for a cell that the law does not cover.
 
 mod affine;
 mod bytes;
@@ -233,7 +235,8 @@ impl<'t> TableView<'t> {
         self.laws[law as usize].as_ref()
     }
 
-    /// Input level of a law at a cell; `None` outside the law's domain, or if the table has no such law.
+    /// Input level of a law at a cell; `None` outside the law's domain, or if the table has no such
+    /// law.
     pub fn lookup(&self, law: Law, cell: Cell) -> Option<u8> {
         self.laws[law as usize].as_ref()?.lookup(cell)
     }

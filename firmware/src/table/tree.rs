@@ -6,11 +6,11 @@
 //! | 1 | 12 each | the pieces, see [`AffineFunction`] |
 //! | | | the tree, see [`Node`] |
 //!
-//! A leaf below 32 is an input level, 32 + k the k-th affine piece. The tree answers for every cell.
-//! Which cells lie in the law's domain is for the domain part to say.
+//! A leaf below 32 is an input level, 32 + k the k-th affine piece. The tree answers for every
+//! cell. Which cells lie in the law's domain is for the domain part to say.
 //!
-//! The tree is checked once, from front to back with a stack of fixed size; after that a lookup visits at most
-//! [`TreeView::depth`] nodes and always ends at a leaf.
+//! The tree is checked once, from front to back with a stack of fixed size; after that a lookup
+//! visits at most [`TreeView::depth`] nodes and always ends at a leaf.
 
 use super::BlockError;
 use super::affine::{AFFINE_LEN, AffineFunction};
@@ -37,8 +37,8 @@ pub(super) struct NodesView<'t> {
 }
 
 impl<'t> NodesView<'t> {
-    /// Checks that the bytes are one tree, that every subtree ends where its parent says, and that `leaf` accepts all
-    /// leaves.
+    /// Checks that the bytes are one tree, that every subtree ends where its parent says, and that
+    /// `leaf` accepts all leaves.
     pub(super) fn parse(nodes: &'t [u8], leaf: impl Fn(u8) -> bool) -> Result<Self, BlockError> {
         if let [only] = nodes {
             return if leaf(*only) {
@@ -124,8 +124,9 @@ impl<'t> NodesView<'t> {
         visits
     }
 
-    /// The same walk as over [`Node::read`] (a test compares them), without taking each node apart first: 26 to 33
-    /// instructions a node. Every turn shortens what is left of the nodes, so the walk ends.
+    /// The same walk as over [`Node::read`] (a test compares them), without taking each node apart
+    /// first: 26 to 33 instructions a node. Every turn shortens what is left of the nodes, so the
+    /// walk ends.
     #[inline(always)]
     fn walk(&self, cell: Cell, mut visit: impl FnMut()) -> Option<u8> {
         // The cell relative to the lowest cell of the node's box.
@@ -141,7 +142,8 @@ impl<'t> NodesView<'t> {
             let (delta, flag) = (u32::from(delta), head & FLAG != 0);
             let index = &mut rest[usize::from(head) % STATES];
             if *index < delta {
-                // Left: with the flag a child below 64 is the right leaf, and the left child follows.
+                // Left: with the flag a child below 64 is the right leaf, and the left child
+                // follows.
                 match (flag, child) {
                     (false, 0..LEAF_VALUES) => return Some(child),
                     (true, LEAF_VALUES..) => return Some(child - LEAF_VALUES),
@@ -205,8 +207,8 @@ impl<'t> TreeView<'t> {
     /// Checks the pieces and the tree.
     ///
     /// # Errors
-    /// A part that is cut short, a piece that could overflow on the grid, a broken or too deep tree, or
-    /// a leaf that names a level or piece that does not exist.
+    /// A part that is cut short, a piece that could overflow on the grid, a broken or too deep
+    /// tree, or a leaf that names a level or piece that does not exist.
     pub fn parse(block: &'t [u8], grid: &Grid, levels: u8) -> Result<Self, BlockError> {
         let (count, rest) = block.split_first().ok_or(BlockError::BadShape)?;
         if *count > AFFINE_PIECES_MAX {

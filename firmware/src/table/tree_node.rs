@@ -1,7 +1,8 @@
 //! Nodes of the tree encoding: reader and writer of one node.
 //!
-//! A tree is a string of nodes in pre-order. A node compares one axis of the cell with a threshold that is relative to
-//! the box of cells the node is responsible for (`delta` cells above its lowest), so most thresholds fit five bits.
+//! A tree is a string of nodes in pre-order. A node compares one axis of the cell with a threshold
+//! that is relative to the box of cells the node is responsible for (`delta` cells above its
+//! lowest), so most thresholds fit five bits.
 //!
 //! | part | bytes | content |
 //! |---|---:|---|
@@ -17,8 +18,8 @@
 //! | 1 | 64..=127 | both are leaves: left is `child - 64`, right is the next byte (0..=63) |
 //! | 0 | 64..=255 | neither is a leaf: the left one follows, the right one `skip` bytes after it begins; skip is `child - 61`, or the next three bytes |
 //!
-//! A node costs 2 bytes, 3 if both children are leaves: between 2 and 2.5 bytes a leaf. A tree that is one leaf is that
-//! one byte.
+//! A node costs 2 bytes, 3 if both children are leaves: between 2 and 2.5 bytes a leaf. A tree that
+//! is one leaf is that one byte.
 
 use super::bytes::{array_at, u16_at};
 use crate::units::STATES;
@@ -117,8 +118,8 @@ impl Node {
         Some((node, next - at))
     }
 
-    /// The node's bytes and how many of them count. Leaf values must be below [`LEAF_VALUES`], the delta not zero and
-    /// the skip within [`SKIP_MAX`]; `None` otherwise.
+    /// The node's bytes and how many of them count. Leaf values must be below [`LEAF_VALUES`], the
+    /// delta not zero and the skip within [`SKIP_MAX`]; `None` otherwise.
     pub fn write(&self) -> Option<([u8; NODE_LEN_MAX], usize)> {
         let mut out = [0u8; NODE_LEN_MAX];
         let mut len = 0;
