@@ -12,6 +12,7 @@ use lab::simulation::closed_loop::{Estimator, simulate};
 use lab::simulation::scenario::Scenario;
 use lab::simulation::trajectory::Run;
 use model::spec::Spec;
+use model::verdict::{Counts, Method, Verdict};
 use serde_json::Value;
 use synth::game::{Sweep, Watch};
 use synth::pipeline::{self, Encoding};
@@ -46,12 +47,26 @@ fn study() -> &'static Study {
 }
 
 fn rendered() -> Rendered {
-    let verdict = serde_json::json!({"verified": false, "claims": [{"name": "stay <&>", "holds": false, "bound": null}]});
+    let verdict = Verdict {
+        verified: false,
+        spec: "spec <&>".to_owned(),
+        claims: Vec::new(),
+        reachable_cells: 0,
+        counterexample: None,
+        spec_hash: String::new(),
+        table_spec_hash: String::new(),
+        table_sha256: String::new(),
+        table_bytes: 0,
+        method: Method::TightSets,
+        counts: Counts::default(),
+        tool_version: String::new(),
+        failures: Vec::new(),
+    };
     let findings = Findings {
         verdict: Some(verdict),
-        budget: Some(
-            serde_json::json!({"table_bytes": 3108, "parts": [{"part": "header", "bytes": 192}]}),
-        ),
+        budget: Some(synth::budget::budget(
+            &TableView::parse(&study().table).unwrap(),
+        )),
     };
     render_studies(std::slice::from_ref(study()), &findings, Vec::new()).unwrap()
 }
@@ -75,7 +90,7 @@ fn numbers_are_those_of_simulate() {
         assert!(page.contains(&number), "{number}");
     }
     // What a finding says is text, not markup.
-    assert!(page.contains("stay &lt;&amp;&gt;") && !page.contains("stay <&>"));
+    assert!(page.contains("spec &lt;&amp;&gt;") && !page.contains("spec <&>"));
 }
 
 #[test]

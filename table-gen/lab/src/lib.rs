@@ -5,6 +5,7 @@
 //! | [`simulation`] | a table, or a baseline | the grid's frequency in time |
 //! | [`fleet`] | a table | the same with one firmware for each charger |
 //! | [`replay`] | a recorded frequency | what the firmware would have done |
+//! | [`falsify`] | a table and a spec | a real trajectory that breaks a claim, if a search finds one |
 //! | [`counterfactual`] | a recorded event | what it would have been with the chargers |
 //! | [`robustness`] | a temporal formula and a trace | true or false, and by how much |
 //! | [`monitor`] | a charger's telemetry | lines for a person |
@@ -12,6 +13,7 @@
 #![forbid(unsafe_code)]
 
 pub mod counterfactual;
+pub mod falsify;
 pub mod fleet;
 pub mod monitor;
 pub mod replay;

@@ -8,8 +8,11 @@
 //! | [`propagator`] | the equations | the exact step in plain numbers |
 //! | [`interval`], [`flow`] | the equations | enclosures of the flow over a time |
 //! | [`grid_shape`] | a grid of cells | cell numbers |
+//! | [`budget`] | a table | bytes, visits and flash left, as data |
+//! | [`verdict`] | a proof or its failure | what commands and report show |
 #![forbid(unsafe_code)]
 
+pub mod budget;
 pub mod flow;
 pub mod grid_shape;
 pub mod interval;
@@ -17,3 +20,4 @@ pub mod logic;
 pub mod plant;
 pub mod propagator;
 pub mod spec;
+pub mod verdict;

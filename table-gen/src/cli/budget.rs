@@ -5,8 +5,9 @@ use std::path::{Path, PathBuf};
 use firmware::table::TableView;
 
 use super::{Failure, OutputArgs, Overrides, output, progress};
+use model::budget::Budget;
 use model::spec::Spec;
-use synth::budget::{self, Budget, sweep};
+use synth::budget::{self, sweep};
 use synth::compress::{self, Options};
 use synth::synthesis;
 
@@ -95,7 +96,7 @@ fn print(budget: &Budget) {
     ]);
     for law in &budget.laws {
         table.add_row(vec![
-            law.law.to_owned(),
+            law.law.clone().into_owned(),
             output::grouped(law.domain_bytes as usize),
             output::grouped(law.inputs_bytes as usize),
             law.worst_visits.to_string(),

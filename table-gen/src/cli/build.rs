@@ -14,6 +14,7 @@ use lab::simulation::closed_loop::{self, Estimator};
 use lab::simulation::monitor::Summary;
 use lab::simulation::scenario::Scenario;
 use lab::simulation::trajectory::PhaseSpan;
+use model::verdict::ClaimName;
 use synth::budget;
 use synth::compress::{LawReport, Options, VISITS_GOAL};
 use synth::pipeline::{self, Encoding};
@@ -113,17 +114,19 @@ pub(super) fn run(args: &BuildArgs) -> Result<(), Failure> {
         table_bytes: bytes.len(),
         encodings: encodings(&table, &emitted.laws),
         verified: verdict.verified,
-        reach_within_s: verdict.claim("settle").and_then(|claim| claim.bound),
+        reach_within_s: verdict
+            .claim(ClaimName::Settle)
+            .and_then(|claim| claim.bound),
         simulation: &run.summary,
         phases: &run.phases,
     };
     let json = serde_json::to_string_pretty(&result).map_err(Failure::bad)?;
     let verdict_json = serde_json::to_string_pretty(&verdict).map_err(Failure::bad)?;
-    let budget = serde_json::to_value(budget::budget(&table)).map_err(Failure::bad)?;
+    let budget = budget::budget(&table);
     let budget_json = serde_json::to_string_pretty(&budget).map_err(Failure::bad)?;
     let findings = Findings {
-        verdict: Some(serde_json::to_value(&verdict).map_err(Failure::bad)?),
-        budget: Some(budget.clone()),
+        verdict: Some(verdict.clone()),
+        budget: Some(budget),
     };
     let page = report::render(&spec, &bytes, &[], &findings, Vec::new()).map_err(Failure::bad)?;
     // A table that is not proven must not be flashed by mistake for one that is.

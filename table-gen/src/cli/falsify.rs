@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use super::{Failure, OutputArgs, Overrides, output};
-use verify::falsify;
+use lab::falsify;
 
 /// Arguments of `falsify`.
 #[derive(Debug, clap::Args)]
@@ -31,7 +31,8 @@ pub(super) fn run(args: &FalsifyArgs) -> Result<(), Failure> {
     let spec = args.overrides.load(&args.spec)?;
     let bytes = std::fs::read(&args.table)
         .map_err(|error| Failure::BadInput(format!("{}: {error}", args.table.display())))?;
-    let found = falsify::falsify(&bytes, &spec, args.steps, args.seed).map_err(Failure::bad)?;
+    let found = falsify::falsify(&bytes, &spec, args.steps, args.seed)
+        .map_err(|error| Failure::BadInput(format!("the firmware rejects the table: {error:?}")))?;
     if args.output.json {
         output::json(&found)?;
     } else {

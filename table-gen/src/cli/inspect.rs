@@ -78,7 +78,7 @@ pub(super) fn run(args: &InspectArgs) -> Result<(), Failure> {
     let Some(name) = &args.slice else {
         return Ok(());
     };
-    let law = Law::ALL.into_iter().find(|law| inspect::name(*law) == name);
+    let law = Law::ALL.into_iter().find(|law| law.name() == name);
     let axis = |name: &str| "fglp".find(name).unwrap_or(0);
     let middle = header.grid.count().map(|n| n / 2);
     let through = args.through.first_chunk::<4>().copied().unwrap_or(middle);

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use firmware::table::TableView;
 use serde::Serialize;
-use serde_json::Value;
+use serde::de::DeserializeOwned;
 
 use super::files::write_all;
 use super::{Failure, OutputArgs, SpecArgs, output, progress};
@@ -191,14 +191,14 @@ fn companions(args: &ReportArgs, spec: &Spec) -> Vec<String> {
 }
 
 /// A JSON file of the folder, if it is there.
-fn finding(args: &ReportArgs, name: &str) -> Result<Option<Value>, Failure> {
+fn finding<T: DeserializeOwned>(args: &ReportArgs, name: &str) -> Result<Option<T>, Failure> {
     let path = args.out.join(name);
     let bad =
         |error: &dyn std::fmt::Display| Failure::BadInput(format!("{}: {error}", path.display()));
     match std::fs::read(&path) {
         Ok(bytes) => serde_json::from_slice(&bytes)
             .map(Some)
-            .map_err(|e| bad(&e)),
+            .map_err(|error| bad(&format_args!("{error}; build writes it anew"))),
         Err(error) if error.kind() == std::io::ErrorKind::NotFound => Ok(None),
         Err(error) => Err(bad(&error)),
     }

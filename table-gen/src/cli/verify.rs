@@ -3,8 +3,10 @@
 use std::path::PathBuf;
 
 use super::{Failure, Overrides, output, progress};
+use lab::falsify::witness;
 use model::spec::Spec;
-use verify::{self, Claim, Counterexample, Verdict, VerifyError};
+use model::verdict::{Claim, Counterexample, Verdict};
+use verify::VerifyError;
 
 /// Arguments of `verify`.
 #[derive(Debug, clap::Args)]
@@ -48,10 +50,14 @@ pub(super) fn run(args: &VerifyArgs) -> Result<(), Failure> {
 /// Verifies with progress on stderr.
 pub(super) fn examine(bytes: &[u8], spec: &Spec) -> Result<Verdict, Failure> {
     let bar = progress::share("verify");
-    verify::verify(bytes, spec, &|done| bar(done)).map_err(|error| match error {
-        VerifyError::Interrupted => Failure::No(error.to_string()),
-        _ => Failure::bad(error),
-    })
+    let mut verdict =
+        verify::verify(bytes, spec, &|done| bar(done)).map_err(|error| match error {
+            VerifyError::Interrupted => Failure::No(error.to_string()),
+            _ => Failure::bad(error),
+        })?;
+    witness::refute(&mut verdict, bytes, spec)
+        .map_err(|error| Failure::bad(VerifyError::Table(error)))?;
+    Ok(verdict)
 }
 
 /// "No" unless every claim holds.
@@ -59,11 +65,11 @@ pub(super) fn answer(verdict: &Verdict) -> Result<(), Failure> {
     if verdict.verified {
         return Ok(());
     }
-    let failed: Vec<&str> = verdict
+    let failed: Vec<String> = verdict
         .claims
         .iter()
         .filter(|claim| !claim.holds)
-        .map(|claim| claim.name)
+        .map(|claim| claim.name.to_string())
         .collect();
     Err(Failure::No(format!("not verified: {}", failed.join(", "))))
 }
@@ -85,11 +91,11 @@ pub(super) fn print(verdict: &Verdict) {
     let number = |value: Option<f64>| value.map_or_else(|| "-".to_owned(), |v| format!("{v:.4}"));
     for claim in &verdict.claims {
         table.add_row(vec![
-            claim.name.to_owned(),
+            claim.name.to_string(),
             if claim.holds { "yes" } else { "NO" }.to_owned(),
             number(claim.bound),
             number(claim.limit),
-            claim.unit.to_owned(),
+            claim.unit.clone().into_owned(),
         ]);
     }
     output::line(table);
@@ -125,7 +131,11 @@ fn counterexample(example: &Counterexample) {
         for step in example.path.iter().rev().take(SHOWN).rev() {
             output::line(format_args!(
                 "  {:7.2} s  {:10} level {:2}  f in [{:.4}, {:.4}] Hz",
-                step.time_s, step.phase, step.level, step.f_low_hz, step.f_high_hz
+                step.time_s,
+                step.phase.name(),
+                step.level,
+                step.f_low_hz,
+                step.f_high_hz
             ));
         }
         return;
@@ -138,7 +148,9 @@ fn counterexample(example: &Counterexample) {
         let [f, g, l, p] = point.state;
         output::line(format_args!(
             "  {:7.2} s  {:10} level {:2}  f {f:.4} Hz  g {g:.3} l {l:.3} p {p:.3} GW",
-            point.time_s, point.phase, point.level
+            point.time_s,
+            point.phase.name(),
+            point.level
         ));
     }
 }

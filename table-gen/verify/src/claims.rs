@@ -3,9 +3,9 @@
 use super::closed_loop::Model;
 use super::header;
 use super::tally::{Tally, Violation};
-use super::verdict::Claim;
 use firmware::table::{Law, TableView};
 use model::spec::Spec;
+use model::verdict::{Claim, ClaimName};
 
 /// What the claims are read off.
 pub(super) struct Findings<'a> {
@@ -24,12 +24,12 @@ impl Findings<'_> {
             self.header(),
             self.containment(),
             self.reach(
-                "reach-outer",
+                ClaimName::ReachOuter,
                 self.tally.periods_c1,
                 "outside I1, f is back in I1",
             ),
             self.reach(
-                "reach-inner",
+                ClaimName::ReachInner,
                 self.tally.periods_c2,
                 "in I1 and outside I2, f is in I2",
             ),
@@ -58,11 +58,11 @@ impl Findings<'_> {
     fn header(&self) -> Claim {
         let differences = header::differences(self.table.header(), self.spec);
         Claim {
-            name: "header",
+            name: ClaimName::Header,
             holds: differences.is_empty(),
             bound: None,
             limit: None,
-            unit: "",
+            unit: "".into(),
             statement: "grid, inputs, clocks and bands of the table are the spec's".to_owned(),
             reason: (!differences.is_empty()).then(|| differences.join("; ")),
         }
@@ -80,24 +80,24 @@ impl Findings<'_> {
             None => format!("f has a lower bound{}, between samples too", self.scope),
         };
         Claim {
-            name: "containment",
+            name: ClaimName::Containment,
             holds: reason.is_none(),
             bound,
             limit,
-            unit: "Hz",
+            unit: "Hz".into(),
             statement,
             reason,
         }
     }
 
-    fn reach(&self, name: &'static str, periods: u32, what: &str) -> Claim {
+    fn reach(&self, name: ClaimName, periods: u32, what: &str) -> Claim {
         let reason = self.reason(&[Violation::Late, Violation::Uncovered]);
         Claim {
             name,
             holds: reason.is_none(),
             bound: reason.is_none().then_some(f64::from(periods)),
             limit: None,
-            unit: "periods",
+            unit: "periods".into(),
             statement: format!("{what} within so many periods{}", self.scope),
             reason,
         }
@@ -106,11 +106,11 @@ impl Findings<'_> {
     fn hand_over(&self) -> Claim {
         let reason = self.reason(&[Violation::Handover, Violation::Uncovered]);
         Claim {
-            name: "hand-over",
+            name: ClaimName::HandOver,
             holds: reason.is_none(),
             bound: None,
             limit: None,
-            unit: "",
+            unit: "".into(),
             statement: format!(
                 "C1 hands over where C2 has an entry: C1 never decides with f in I1{}",
                 self.scope
@@ -131,11 +131,11 @@ impl Findings<'_> {
             "I2"
         };
         Claim {
-            name: "settle",
+            name: ClaimName::Settle,
             holds: reason.is_none(),
             bound: Some(bound),
             limit: Some(limit),
-            unit: "s",
+            unit: "s".into(),
             statement: format!(
                 "after leaving I1, f is in {target} within {limit} s{}",
                 self.scope
@@ -148,11 +148,11 @@ impl Findings<'_> {
         let reason = self.reason(&[Violation::Left, Violation::Uncovered, Violation::Late]);
         let [low, high] = self.spec.requirements.inner_hz;
         Claim {
-            name: "stay",
+            name: ClaimName::Stay,
             holds: reason.is_none(),
             bound: self.tally.held.map(|range| range.low / 1e6),
             limit: Some(low),
-            unit: "Hz",
+            unit: "Hz".into(),
             statement: format!(
                 "once Hold is in force, {low} <= f <= {high} Hz for ever, between samples too"
             ),
@@ -171,11 +171,11 @@ impl Findings<'_> {
             .map(|law| law.worst_visits)
             .max();
         Claim {
-            name: "table",
+            name: ClaimName::Table,
             holds: reason.is_none(),
             bound: Some(f64::from(self.tally.worst_visits)),
             limit: limit.map(f64::from),
-            unit: "visits",
+            unit: "visits".into(),
             statement: "every reachable state has an entry, and no lookup visits more than the header states"
                 .to_owned(),
             reason,

@@ -130,13 +130,6 @@ impl Model {
             &self.tick
         }
     }
-
-    /// Whether the loop is deterministic but for the moment of the event: no disturbance, no error, one initial state.
-    pub(crate) fn is_exact(&self) -> bool {
-        self.drives.iter().all(|drive| drive.radius <= 1e-3)
-            && self.error == [0.0; STATES]
-            && self.initial.iter().all(|axis| axis.high - axis.low <= 1e-3)
-    }
 }
 
 /// A number of the spec in micro-units. Decimal numbers that name whole micro-units become exactly those.

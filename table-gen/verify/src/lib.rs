@@ -16,8 +16,7 @@
 //! | tables without Hold: tight sets in time, over the horizon | `timed` |
 //! | tables with Hold: No control by tight sets, then whole cells for ever | `watching`, `closed` |
 //! | the worst number of periods | `longest_path` |
-//! | claims and verdict | `claims`, `verdict` |
-//! | a real trajectory for a claim that fails | `witness`, `replay` |
+//! | claims | `claims` |
 //!
 //! # What is claimed
 //! The event finds the grid in a state of `uncertainty.initial` and the firmware in No control, at any moment between
@@ -28,33 +27,27 @@
 //! firmware predicts there for the moment at which its command begins to act, and times end at that moment; bounds of f are always those of
 //! the real f.
 
-mod adversaries;
 mod cellset;
 mod claims;
 mod closed;
 mod closed_loop;
 mod event;
-pub mod falsify;
 mod header;
 mod knowledge;
 mod longest_path;
 
 mod path;
 mod regions;
-mod replay;
 mod segment;
 mod successor;
 mod tally;
 #[cfg(test)]
 mod tests;
 mod timed;
-mod verdict;
 mod watching;
-mod witness;
 mod zonotope;
 
-pub use path::ShownStep;
-pub use verdict::{Claim, Counterexample, Counts, RealPath, RealPoint, Verdict};
+use model::verdict::{ClaimName, Counterexample, Counts, Method, Verdict};
 
 use firmware::table::{TableError, TableView};
 use sha2::{Digest, Sha256};
@@ -63,7 +56,6 @@ use claims::Findings;
 use closed_loop::Model;
 use model::spec::Spec;
 use regions::Regions;
-use replay::Replay;
 use tally::{Tally, Violation};
 
 /// Horizon \[s\] over which a table without Hold is explored where the spec asks for ever: it cannot be proven then, but
@@ -119,7 +111,7 @@ pub fn verify(
             limit: Some(limit.clone()),
             ..Tally::default()
         };
-        (tally, 0, "not explored", String::new())
+        (tally, 0, Method::NotExplored, String::new())
     } else if header.stay {
         let job = closed::Closed {
             table: &table,
@@ -136,7 +128,7 @@ pub fn verify(
         };
         let (tally, cells) =
             for_ever(&job, &watching, &mut counts, go_on).ok_or(VerifyError::Interrupted)?;
-        (tally, cells, "closed set of cells", String::new())
+        (tally, cells, Method::ClosedSet, String::new())
     } else {
         let horizon_s = spec.requirements.horizon_s;
         let ticks = (horizon_s.unwrap_or(OPEN_HORIZON_S) / model.tick_s).ceil() as u32;
@@ -157,7 +149,7 @@ pub fn verify(
         counts.sets = explored.nodes;
         let first = f64::from(tally.event_ticks) * model.tick_s;
         counts.event_to_inner_s = (tally.event_ticks > 0).then_some(first);
-        (tally, explored.cells, "tight sets in time", scope)
+        (tally, explored.cells, Method::TightSets, scope)
     };
     counts.lookups = tally.lookups;
     counts.held_hz = tally.held.map(|range| [range.low / 1e6, range.high / 1e6]);
@@ -170,22 +162,21 @@ pub fn verify(
         scope,
     }
     .claims();
-    let ticks =
-        (spec.requirements.horizon_s.unwrap_or(OPEN_HORIZON_S) / model.tick_s).ceil() as u32;
-    let replay = Replay::new(&table, &model, [inner.low, inner.high], settle_ticks);
+    let failures = failures(&tally, model.tick_s);
     Ok(Verdict {
         verified: claims.iter().all(|claim| claim.holds),
         spec: spec.name.clone(),
         claims,
         reachable_cells,
-        counterexample: counterexample(&tally, &model, &replay, ticks),
+        counterexample: failures.first().cloned(),
         spec_hash: hex(&spec.hash()),
         table_spec_hash: hex(&header.spec_hash),
         table_sha256: hex(&Sha256::digest(bytes)),
         table_bytes: bytes.len(),
         method,
         counts,
-        tool_version: env!("CARGO_PKG_VERSION"),
+        tool_version: env!("CARGO_PKG_VERSION").to_owned(),
+        failures,
     })
 }
 
@@ -220,39 +211,23 @@ fn for_ever(
     Some((tally, cells))
 }
 
-fn counterexample(
-    tally: &Tally,
-    model: &Model,
-    replay: &Replay<'_>,
-    ticks: u32,
-) -> Option<Counterexample> {
-    // Of several violations the one with a real trajectory says most.
-    let mut open = None;
-    for (kind, found) in &tally.violations {
-        let claim = match kind {
-            Violation::Containment => "containment",
-            Violation::Late => "settle",
-            Violation::Left => "stay",
-            Violation::Handover => "hand-over",
-            Violation::Uncovered | Violation::Visits => "table",
-        };
-        let real = witness::find(replay, model, *kind, ticks);
-        let shown = Counterexample {
-            claim,
+/// The first failure of each kind, as sets.
+fn failures(tally: &Tally, tick_s: f64) -> Vec<Counterexample> {
+    let violations = tally.violations.iter();
+    violations
+        .map(|(kind, found)| Counterexample {
+            claim: match kind {
+                Violation::Containment => ClaimName::Containment,
+                Violation::Late => ClaimName::Settle,
+                Violation::Left => ClaimName::Stay,
+                Violation::Handover => ClaimName::HandOver,
+                Violation::Uncovered | Violation::Visits => ClaimName::Table,
+            },
             what: found.what.clone(),
-            path: found
-                .path
-                .iter()
-                .map(|step| step.shown(model.tick_s))
-                .collect(),
-            real,
-        };
-        if shown.real.is_some() {
-            return Some(shown);
-        }
-        open.get_or_insert(shown);
-    }
-    open
+            path: found.path.iter().map(|step| step.shown(tick_s)).collect(),
+            real: None,
+        })
+        .collect()
 }
 
 fn hex(bytes: &[u8]) -> String {

@@ -1,9 +1,8 @@
 //! Where a set came from: one line for every decision on its way, kept for the counterexample.
 
 use firmware::phase::Phase;
-use serde::Serialize;
-
 use model::interval::Interval;
+use model::verdict::ShownStep;
 
 /// One step of a path of sets.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -32,41 +31,12 @@ impl PathStep {
     pub(crate) fn shown(&self, tick_s: f64) -> ShownStep {
         ShownStep {
             time_s: f64::from(self.tick) * tick_s,
-            phase: phase_name(self.phase),
+            phase: self.phase,
             level: self.level,
             cell: self.cell,
             f_low_hz: self.set.low / 1e6,
             f_high_hz: self.set.high / 1e6,
         }
-    }
-}
-
-/// One step of a counterexample's path.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct ShownStep {
-    /// Time from the first tick after the event \[s\].
-    pub time_s: f64,
-    /// Law in force from then on.
-    pub phase: &'static str,
-    /// Input level from then on.
-    pub level: u8,
-    /// Cell of the measured state, where one was looked up.
-    pub cell: Option<[u16; 4]>,
-    /// Lowest deviation of the set \[Hz\].
-    pub f_low_hz: f64,
-    /// Highest deviation of the set \[Hz\].
-    pub f_high_hz: f64,
-}
-
-/// Name of a phase in verdicts.
-pub(crate) fn phase_name(phase: Phase) -> &'static str {
-    match phase {
-        Phase::NoControl => "No control",
-        Phase::C1 => "C1",
-        Phase::C2 => "C2",
-        Phase::Fixed => "Fixed",
-        Phase::Hold => "Hold",
-        Phase::Fallback => "Fallback",
     }
 }
 

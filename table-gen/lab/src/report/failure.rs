@@ -1,41 +1,30 @@
 //! The path that breaks a claim: sets of frequencies, and a real trajectory if one was found.
 
-use serde_json::Value;
+use model::spec::Spec;
+use model::verdict::{ClaimName, Counterexample, RealPath, ShownStep, Verdict};
 
 use super::curves::{bands, floor_hz};
 use super::figure::{Curve, Figure, RangeOverTime, Stretch};
 use super::palette::Colour;
 use super::section::{DataTable, Section};
 use crate::simulation::NOMINAL_HZ;
-use model::spec::Spec;
 
 /// Rows of the table of the path: the last ones, which lead to the failure.
 const ROWS: usize = 20;
 
-/// A step of the path.
-struct Step {
-    time_s: f64,
-    phase: String,
-    level: u64,
-    low_hz: f64,
-    high_hz: f64,
-}
-
 /// The section of a verdict with a counterexample; none without one.
-pub fn section(verdict: Option<&Value>, spec: &Spec) -> Option<Section> {
-    let example = verdict?.get("counterexample")?;
-    let claim = example.get("claim")?.as_str()?;
-    let what = text(example, "what");
-    let steps = steps(example);
-    let real = example.get("real").filter(|real| !real.is_null());
+pub fn section(verdict: Option<&Verdict>, spec: &Spec) -> Option<Section> {
+    let Counterexample {
+        claim,
+        what,
+        path,
+        real,
+    } = verdict?.counterexample.as_ref()?;
     let answer = match real {
         Some(real) => format!(
             "{claim} is refuted by a real trajectory, replayed with the firmware: {} at {:.3} s after the event, which lies {:.4} s before the \
              first tick (disturbances: {}).",
-            text(real, "what"),
-            number(real, "breach_s").unwrap_or_default(),
-            number(real, "first_tick_s").unwrap_or_default(),
-            text(real, "adversary")
+            real.what, real.breach_s, real.first_tick_s, real.adversary
         ),
         None => format!(
             "{claim} is not proven: {what}. No real trajectory was found that breaks it, so the claim is open."
@@ -47,46 +36,24 @@ pub fn section(verdict: Option<&Value>, spec: &Spec) -> Option<Section> {
     );
     section
         .figures
-        .extend(figure(claim, &what, &steps, real, spec));
-    section.tables.push(table(&steps));
+        .extend(figure(*claim, what, path, real.as_ref(), spec));
+    section.tables.push(table(path));
     Some(section)
 }
 
-fn steps(example: &Value) -> Vec<Step> {
-    let path = example.get("path").and_then(Value::as_array);
-    path.into_iter()
-        .flatten()
-        .filter_map(|step| {
-            Some(Step {
-                time_s: number(step, "time_s")?,
-                phase: text(step, "phase"),
-                level: step.get("level")?.as_u64()?,
-                low_hz: NOMINAL_HZ + number(step, "f_low_hz")?,
-                high_hz: NOMINAL_HZ + number(step, "f_high_hz")?,
-            })
-        })
-        .collect()
-}
-
 /// The real trajectory's frequency; time counts from the first tick, as in the sets.
-fn trajectory(real: &Value) -> Vec<(f64, f64)> {
-    let first_tick_s = number(real, "first_tick_s").unwrap_or_default();
-    let points = real.get("frequency").and_then(Value::as_array);
+fn trajectory(real: &RealPath) -> Vec<(f64, f64)> {
+    let points = real.frequency.iter();
     points
-        .into_iter()
-        .flatten()
-        .filter_map(|point| {
-            let (time, f) = (point.get(0)?.as_f64()?, point.get(1)?.as_f64()?);
-            Some((time - first_tick_s, NOMINAL_HZ + f))
-        })
+        .map(|[time_s, f]| (time_s - real.first_tick_s, NOMINAL_HZ + f))
         .collect()
 }
 
 fn figure(
-    claim: &str,
+    claim: ClaimName,
     what: &str,
-    steps: &[Step],
-    real: Option<&Value>,
+    steps: &[ShownStep],
+    real: Option<&RealPath>,
     spec: &Spec,
 ) -> Option<Figure> {
     let mut curves = Vec::new();
@@ -102,7 +69,10 @@ fn figure(
     }
     let spans: Vec<(f64, f64, f64)> = steps
         .iter()
-        .map(|step| (step.time_s, step.low_hz, step.high_hz))
+        .map(|step| {
+            let [low, high] = hz(step);
+            (step.time_s, low, high)
+        })
         .collect();
     let times = spans
         .iter()
@@ -145,17 +115,10 @@ fn figure(
 }
 
 /// The laws in force along the path.
-fn stretches(steps: &[Step], end_s: f64) -> Vec<Stretch> {
+fn stretches(steps: &[ShownStep], end_s: f64) -> Vec<Stretch> {
     let mut found: Vec<Stretch> = Vec::new();
     for (index, step) in steps.iter().enumerate() {
-        let name = match step.phase.as_str() {
-            "No control" => "no-control",
-            "C1" => "C1",
-            "C2" => "C2",
-            "Hold" => "hold",
-            "Fallback" => "fallback",
-            _ => "fixed",
-        };
+        let name = step.phase.name();
         let until = steps.get(index + 1).map_or(end_s, |next| next.time_s);
         match found.last_mut() {
             Some(last) if last.name == name => last.end_s = until,
@@ -170,7 +133,7 @@ fn stretches(steps: &[Step], end_s: f64) -> Vec<Stretch> {
     found
 }
 
-fn table(steps: &[Step]) -> DataTable {
+fn table(steps: &[ShownStep]) -> DataTable {
     let header = [
         "Time [s]",
         "Law",
@@ -183,54 +146,81 @@ fn table(steps: &[Step]) -> DataTable {
         &header,
     );
     for step in steps.iter().rev().take(ROWS).rev() {
+        let [low, high] = hz(step);
         table.row([
             format!("{:.2}", step.time_s),
-            step.phase.clone(),
+            step.phase.name().to_owned(),
             step.level.to_string(),
-            format!("{:.4}", step.low_hz),
-            format!("{:.4}", step.high_hz),
+            format!("{low:.4}"),
+            format!("{high:.4}"),
         ]);
     }
     table
 }
 
-fn number(value: &Value, name: &str) -> Option<f64> {
-    value.get(name)?.as_f64()
-}
-
-fn text(value: &Value, name: &str) -> String {
-    value
-        .get(name)
-        .and_then(Value::as_str)
-        .unwrap_or_default()
-        .to_owned()
+/// Lowest and highest frequency of a set.
+fn hz(step: &ShownStep) -> [f64; 2] {
+    [NOMINAL_HZ + step.f_low_hz, NOMINAL_HZ + step.f_high_hz]
 }
 
 #[cfg(test)]
 mod tests {
     use super::super::chart;
     use super::*;
-    use serde_json::json;
+    use firmware::phase::Phase;
+    use model::verdict::{Counts, Method};
 
     fn spec() -> Spec {
         Spec::load("paper-bi", &[]).unwrap()
     }
 
-    fn verdict(real: &Value) -> Value {
-        let step = |time_s: f64, phase: &str, low: f64, high: f64| json!({"time_s": time_s, "phase": phase, "level": 3, "cell": null, "f_low_hz": low, "f_high_hz": high});
-        json!({"verified": false, "counterexample": {
-            "claim": "containment",
-            "what": "f may fall to -0.8100 Hz",
-            "path": [step(0.0, "No control", -0.02, 0.0), step(1.3, "C1", -0.31, -0.3), step(2.8, "C1", -0.82, -0.5)],
-            "real": real,
-        }})
+    fn verdict(real: Option<RealPath>) -> Verdict {
+        let step = |time_s, phase, f_low_hz, f_high_hz| ShownStep {
+            time_s,
+            phase,
+            level: 3,
+            cell: None,
+            f_low_hz,
+            f_high_hz,
+        };
+        Verdict {
+            verified: false,
+            spec: "paper-bi".to_owned(),
+            claims: Vec::new(),
+            reachable_cells: 0,
+            counterexample: Some(Counterexample {
+                claim: ClaimName::Containment,
+                what: "f may fall to -0.8100 Hz".to_owned(),
+                path: vec![
+                    step(0.0, Phase::NoControl, -0.02, 0.0),
+                    step(1.3, Phase::C1, -0.31, -0.3),
+                    step(2.8, Phase::C1, -0.82, -0.5),
+                ],
+                real,
+            }),
+            spec_hash: String::new(),
+            table_spec_hash: String::new(),
+            table_sha256: String::new(),
+            table_bytes: 0,
+            method: Method::TightSets,
+            counts: Counts::default(),
+            tool_version: String::new(),
+            failures: Vec::new(),
+        }
     }
 
     #[test]
     fn the_sets_and_the_real_trajectory_share_a_clock_and_are_drawn() {
-        let real = json!({"what": "f falls to -0.8100 Hz", "breach_s": 2.05, "first_tick_s": 0.05, "adversary": "none",
-            "frequency": [[0.0, 0.0], [0.05, -0.01], [2.05, -0.81]]});
-        let section = section(Some(&verdict(&real)), &spec()).unwrap();
+        let real = RealPath {
+            what: "f falls to -0.8100 Hz".to_owned(),
+            breach_s: 2.05,
+            first_tick_s: 0.05,
+            initial: [0.0; 4],
+            adversary: "none".to_owned(),
+            points: Vec::new(),
+            frequency: vec![[0.0, 0.0], [0.05, -0.01], [2.05, -0.81]],
+        };
+        let section = section(Some(&verdict(Some(real))), &spec()).unwrap();
         assert!(section.words[0].contains("refuted") && section.words[0].contains("2.050 s"));
         let [figure] = &section.figures[..] else {
             panic!("one figure")
@@ -253,7 +243,7 @@ mod tests {
 
     #[test]
     fn without_a_real_trajectory_the_claim_is_open() {
-        let section = section(Some(&verdict(&Value::Null)), &spec()).unwrap();
+        let section = section(Some(&verdict(None)), &spec()).unwrap();
         assert!(section.words[0].contains("not proven") && section.words[0].contains("open"));
         assert!(section.figures[0].curves.is_empty());
         chart::svg(&section.figures[0]).unwrap();
@@ -262,11 +252,11 @@ mod tests {
     #[test]
     fn a_verdict_without_a_counterexample_has_no_such_section() {
         assert_eq!(section(None, &spec()), None);
-        let proven = json!({"verified": true, "counterexample": null});
+        let proven = Verdict {
+            verified: true,
+            counterexample: None,
+            ..verdict(None)
+        };
         assert_eq!(section(Some(&proven), &spec()), None);
-        // A folder may hold a verdict of another version: what is not there is not drawn.
-        let odd = json!({"counterexample": {"claim": "stay", "path": [{"phase": 1}]}});
-        let section = section(Some(&odd), &spec()).unwrap();
-        assert!(section.figures.is_empty());
     }
 }

@@ -27,9 +27,9 @@ pub mod responses;
 pub mod section;
 pub mod study;
 
-use serde_json::Value;
-
+use model::budget::Budget;
 use model::spec::Spec;
+use model::verdict::Verdict;
 use section::Section;
 use study::{Study, StudyError};
 
@@ -76,13 +76,13 @@ impl Rendered {
     }
 }
 
-/// Results of other commands that the report shows if they are there, in their JSON form.
+/// Results of other commands that the report shows if they are there.
 #[derive(Debug, Clone, Default)]
 pub struct Findings {
     /// Of `verify`.
-    pub verdict: Option<Value>,
+    pub verdict: Option<Verdict>,
     /// Of `budget`.
-    pub budget: Option<Value>,
+    pub budget: Option<Budget>,
 }
 
 /// Runs of the robustness section unless asked otherwise.

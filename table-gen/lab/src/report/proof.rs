@@ -1,40 +1,35 @@
 //! Verdict, budget, spec and hashes.
 
-use serde_json::Value;
+use model::budget::Budget;
+use model::verdict::Verdict;
+use serde::Serialize;
 use sha2::{Digest, Sha256};
 
 use super::section::{DataTable, Section};
 use super::study::Study;
 
 /// What `verify` found.
-pub fn verdict(verdict: Option<&Value>) -> Section {
+pub fn verdict(verdict: Option<&Verdict>) -> Section {
     let section = Section::new("Verdict of the proof");
     let Some(verdict) = verdict else {
         return section.say(
             "This table has not been verified in this folder: nothing here is proved. Run verify, or build, which does.",
         );
     };
-    let answer = match verdict.get("verified").and_then(Value::as_bool) {
-        Some(true) => {
-            "The bytes of the table are verified: every claim below holds for every uncertainty of the spec."
-        }
-        Some(false) => "The table is NOT verified: at least one claim below fails.",
-        None => "The verdict does not say whether the table is verified.",
-    };
-    let mut section = section.say(answer);
-    if let Some(claims) = verdict.get("claims").and_then(Value::as_array) {
-        let mut table = DataTable::new("Claims (verify)", &["Claim", "Answer", "Bound"]);
-        for claim in claims {
-            let answer = match claim.get("holds").and_then(Value::as_bool) {
-                Some(true) => "holds",
-                Some(false) => "fails",
-                None => "open",
-            };
-            let field = |name: &str| claim.get(name).map_or_else(String::new, text);
-            table.row([field("name"), answer.to_owned(), field("bound")]);
-        }
-        section.tables.push(table);
+    let mut section = section.say(if verdict.verified {
+        "The bytes of the table are verified: every claim below holds for every uncertainty of the spec."
+    } else {
+        "The table is NOT verified: at least one claim below fails."
+    });
+    let mut table = DataTable::new("Claims (verify)", &["Claim", "Answer", "Bound"]);
+    for claim in &verdict.claims {
+        table.row([
+            claim.name.to_string(),
+            if claim.holds { "holds" } else { "fails" }.to_owned(),
+            number(claim.bound),
+        ]);
     }
+    section.tables.push(table);
     section
         .listings
         .push(("The verdict in full".to_owned(), pretty(verdict)));
@@ -42,51 +37,68 @@ pub fn verdict(verdict: Option<&Value>) -> Section {
 }
 
 /// What `budget` found.
-pub fn budget(budget: Option<&Value>) -> Section {
-    let section = Section::new("Budget");
+pub fn budget(budget: Option<&Budget>) -> Section {
+    let mut section = Section::new("Budget");
     let Some(budget) = budget else {
         return section.say("No budget in this folder. Run budget, or build, which does.");
     };
-    let mut section = section;
-    let Some(fields) = budget.as_object() else {
-        section
-            .listings
-            .push(("The budget in full".to_owned(), pretty(budget)));
-        return section;
-    };
     let mut plain = DataTable::new("Budget", &["Part", "Value"]);
-    for (key, value) in fields {
-        match value {
-            Value::Array(rows) if rows.iter().any(Value::is_object) => {
-                section.tables.push(records(key, rows));
-            }
-            Value::Object(inner) => {
-                for (name, value) in inner {
-                    plain.row([format!("{key}: {name}"), text(value)]);
-                }
-            }
-            _ => plain.row([key.clone(), text(value)]),
-        }
+    let measured = &budget.measured;
+    for (part, value) in [
+        ("table [bytes]", Some(budget.table_bytes as u64)),
+        (
+            "header and checksum [bytes]",
+            Some(budget.header_bytes as u64),
+        ),
+        (
+            "code for the charger, measured [bytes]",
+            measured.core_bytes,
+        ),
+        (
+            "worst lookup, measured [instructions]",
+            measured.lookup_instructions,
+        ),
+    ] {
+        plain.row([part.to_owned(), number(value)]);
     }
-    section.tables.insert(0, plain);
+    section.tables.push(plain);
+    let header = [
+        "Law",
+        "Domain [bytes]",
+        "Inputs [bytes]",
+        "Worst visits",
+        "Mean visits",
+    ];
+    let mut laws = DataTable::new("Laws (budget)", &header);
+    for law in &budget.laws {
+        laws.row([
+            law.law.to_string(),
+            law.domain_bytes.to_string(),
+            law.inputs_bytes.to_string(),
+            law.worst_visits.to_string(),
+            format!("{:.1}", law.mean_visits),
+        ]);
+    }
+    section.tables.push(laws);
+    let header = [
+        "Microcontroller",
+        "Core",
+        "Flash [KiB]",
+        "Left [bytes]",
+        "Taken",
+    ];
+    let mut rooms = DataTable::new("Flash left (budget)", &header);
+    for room in &budget.rooms {
+        rooms.row([
+            room.part.name.clone(),
+            room.part.core.clone(),
+            room.part.flash_kib.to_string(),
+            room.left_bytes.to_string(),
+            format!("{:.2} %", 100.0 * room.share),
+        ]);
+    }
+    section.tables.push(rooms);
     section
-}
-
-/// Objects with the same keys as a table.
-fn records(caption: &str, rows: &[Value]) -> DataTable {
-    let keys: Vec<&str> = rows
-        .iter()
-        .find_map(Value::as_object)
-        .map(|first| first.keys().map(String::as_str).collect())
-        .unwrap_or_default();
-    let mut table = DataTable::new(caption, &keys);
-    for row in rows {
-        table.row(
-            keys.iter()
-                .map(|key| row.get(*key).map_or_else(String::new, text)),
-        );
-    }
-    table
 }
 
 /// Where a study comes from: its spec, and hashes of spec and table.
@@ -111,15 +123,11 @@ pub fn origin(study: &Study) -> Section {
     section
 }
 
-/// A JSON value in a cell.
-fn text(value: &Value) -> String {
-    match value {
-        Value::String(text) => text.clone(),
-        Value::Null => "–".to_owned(),
-        other => other.to_string(),
-    }
+/// A number in a cell, or a dash.
+fn number<N: ToString>(value: Option<N>) -> String {
+    value.map_or_else(|| "–".to_owned(), |value| value.to_string())
 }
 
-fn pretty(value: &Value) -> String {
+fn pretty(value: &impl Serialize) -> String {
     serde_json::to_string_pretty(value).unwrap_or_else(|error| error.to_string())
 }

@@ -1,19 +1,10 @@
 //! What was measured on the reference core, as committed by `cargo fw costs --bless`.
 
 use firmware::table::{CRC_LEN, TableView};
-use serde::Serialize;
+use model::budget::Measured;
 
 const SIZES: &str = include_str!("../../../../firmware/expected/sizes.txt");
 const RUN: &str = include_str!("../../../../firmware/expected/run.txt");
-
-/// Figures of the reference core, a Cortex-M4F.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
-pub struct Measured {
-    /// Code and constants of the charger without a HAL, the reader among them \[bytes\].
-    pub core_bytes: Option<u64>,
-    /// Instructions of the worst lookup, quantiser included; only of the very table that was measured.
-    pub lookup_instructions: Option<u64>,
-}
 
 /// The figures that are known for a table.
 pub fn measured(table: &TableView<'_>) -> Measured {

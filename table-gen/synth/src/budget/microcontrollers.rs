@@ -1,24 +1,9 @@
 //! The list of microcontrollers: `data/microcontrollers.csv`, with the source of every flash size.
 
-use serde::{Deserialize, Serialize};
+use model::budget::Microcontroller;
 
 /// The list as it is shipped.
 const LIST: &str = include_str!("../../../data/microcontrollers.csv");
-
-/// A microcontroller.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Microcontroller {
-    /// Name, with the suffix that decides the flash.
-    pub name: String,
-    /// Core.
-    pub core: String,
-    /// Flash \[KiB\].
-    pub flash_kib: u32,
-    /// What should be known.
-    pub note: String,
-    /// Where the flash size is from.
-    pub source: String,
-}
 
 /// All of them, in the order of the list.
 pub fn all() -> Vec<Microcontroller> {

@@ -6,53 +6,10 @@ pub mod sweep;
 
 use firmware::prediction::prediction_len;
 use firmware::table::{CRC_LEN, HEADER_LEN, Law, TableView};
-use serde::Serialize;
+use model::budget::{Budget, LawBudget, Room};
 
 use crate::inspect;
-use measured::{Measured, measured};
-use microcontrollers::Microcontroller;
-
-/// Bytes and visits of a law.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct LawBudget {
-    /// The law.
-    pub law: &'static str,
-    /// Bytes of the domain part.
-    pub domain_bytes: u32,
-    /// Bytes of the inputs part.
-    pub inputs_bytes: u32,
-    /// Most visits of a lookup, by the header.
-    pub worst_visits: u16,
-    /// Mean visits over the covered cells.
-    pub mean_visits: f64,
-}
-
-/// What is left on a microcontroller.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Room {
-    /// The microcontroller.
-    #[serde(flatten)]
-    pub part: Microcontroller,
-    /// Flash left \[bytes\], negative if the table does not fit.
-    pub left_bytes: i64,
-    /// Share of the flash that the table takes.
-    pub share: f64,
-}
-
-/// The budget of a table.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Budget {
-    /// Bytes in all.
-    pub table_bytes: usize,
-    /// Header and CRC.
-    pub header_bytes: usize,
-    /// The laws.
-    pub laws: Vec<LawBudget>,
-    /// What was measured on the reference core.
-    pub measured: Measured,
-    /// Flash left on each microcontroller of the list, the code not counted: its size depends on the core.
-    pub rooms: Vec<Room>,
-}
+use measured::measured;
 
 /// Adds a table up.
 pub fn budget(table: &TableView<'_>) -> Budget {
@@ -63,7 +20,7 @@ pub fn budget(table: &TableView<'_>) -> Budget {
             let entry = table.header().laws[law as usize]?;
             let survey = inspect::survey(table, law)?;
             Some(LawBudget {
-                law: inspect::name(law),
+                law: law.name().into(),
                 domain_bytes: entry.domain_len,
                 inputs_bytes: entry.inputs_len,
                 worst_visits: entry.worst_visits,

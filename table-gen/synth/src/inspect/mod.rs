@@ -99,7 +99,7 @@ pub fn survey(table: &TableView<'_>, law: Law) -> Option<LawSurvey> {
     let cells: u64 = sums.histogram.iter().sum();
     let mean = |sum: u64, of: u64| if of == 0 { 0.0 } else { sum as f64 / of as f64 };
     Some(LawSurvey {
-        law: name(law),
+        law: law.name(),
         cells,
         histogram: sums.histogram[..usize::from(table.header().levels)].to_vec(),
         jump_max: sums.jump_max,
@@ -107,15 +107,6 @@ pub fn survey(table: &TableView<'_>, law: Law) -> Option<LawSurvey> {
         visits_max: sums.visits_max,
         visits_mean: mean(sums.visits, cells),
     })
-}
-
-/// Name of a law as the reports write it.
-pub fn name(law: Law) -> &'static str {
-    match law {
-        Law::C1 => "C1",
-        Law::C2 => "C2",
-        Law::Hold => "Hold",
-    }
 }
 
 fn cells_of_slab(grid: &Grid, p: u16) -> impl Iterator<Item = [u16; STATES]> {

@@ -1,16 +1,12 @@
-//! Commands that act with a delay: the device's prediction against an integration, the boxes of games and verifier against trajectories,
-//! and whole verdicts.
-
-use std::sync::LazyLock;
+//! Commands that act with a delay: the device's prediction against an integration, the boxes of games
+//! and verifier against trajectories.
 
 use firmware::prediction::{History, PredictionView};
-use firmware::table::{HEADER_LEN, LAWS, TableView};
+use firmware::table::{LAWS, TableView};
 use firmware::units::State;
 
-use super::{judge, table};
-use crate::adversaries::Random;
+use super::Random;
 use crate::closed_loop::Model;
-use crate::falsify::falsify;
 use crate::successor::{index, successor};
 use model::interval::Interval;
 use model::plant::{GridPlant, STATES};
@@ -41,8 +37,6 @@ fn delayed(more: &[&str]) -> Spec {
         .collect();
     Spec::load("gb-bi", &all).unwrap()
 }
-
-static DELAYED_TABLE: LazyLock<Vec<u8>> = LazyLock::new(|| table(&delayed(&[])));
 
 /// A table of head and no laws.
 fn bare(spec: &Spec) -> Vec<u8> {
@@ -331,71 +325,4 @@ fn check_effective(
             most[d] = most[d].max(off / bound);
         }
     }
-}
-
-#[test]
-fn a_delayed_table_is_proven_and_stands() {
-    let spec = delayed(&[]);
-    let verdict = judge(&DELAYED_TABLE, &spec);
-    assert!(verdict.verified, "{:#?}", verdict.claims);
-    let [low, high] = verdict.counts.held_hz.unwrap();
-    assert!(low >= -0.4 && high <= 0.2);
-    let stands = falsify(&DELAYED_TABLE, &spec, 200_000, 1).unwrap();
-    assert_eq!(stands.violation, None);
-    // Three times the uncertainty of the loss, and much more of the participation: a real trajectory breaks it.
-    let wider = delayed(&[
-        "uncertainty.loss_gw=[1.8,2.2]",
-        "uncertainty.participation=0.3",
-    ]);
-    assert!(!judge(&DELAYED_TABLE, &wider).verified);
-    let falls = falsify(&DELAYED_TABLE, &wider, 1_000_000, 1).unwrap();
-    assert!(falls.violation.is_some(), "{falls:?}");
-}
-
-#[test]
-fn a_changed_coefficient_and_another_delay_are_rejected() {
-    let spec = delayed(&[]);
-    let with = |word: usize, change: &dyn Fn(i32) -> i32| {
-        let mut image = DELAYED_TABLE.clone();
-        let at = HEADER_LEN + 4 * word;
-        let value = i32::from_le_bytes(image[at..at + 4].try_into().unwrap());
-        image[at..at + 4].copy_from_slice(&change(value).to_le_bytes());
-        firmware::table::seal(&mut image).unwrap();
-        image
-    };
-    // A hundredth of Φ_ff, of W on f, and a tenth of G_3 on f: each moves the prediction by a few mHz.
-    let third = 20 + 4 * 2;
-    for (word, share) in [(0, 100), (16, 50), (third, 5)] {
-        let mutant = with(word, &|value| value + value / share);
-        let verdict = judge(&mutant, &spec);
-        assert!(!verdict.verified, "word {word}");
-    }
-    // One unit in the last place is within what the proof has room for, and it says so.
-    assert!(judge(&with(third, &|value| value + 1), &spec).verified);
-    let longer = delayed(&["uncertainty.actuation_delay_s=1.1"]);
-    let none = delayed(&["uncertainty.actuation_delay_s=0"]);
-    for other in [longer, none] {
-        let verdict = judge(&DELAYED_TABLE, &other);
-        assert!(!verdict.verified);
-        assert!(!verdict.claim("header").unwrap().holds);
-        assert!(!verdict.claim("containment").unwrap().holds);
-    }
-}
-
-#[test]
-fn the_papers_table_is_proven_with_half_a_second() {
-    let set = ["uncertainty.actuation_delay_s=0.5".to_owned()];
-    let spec = Spec::load("paper-bi", &set).unwrap();
-    let bytes = table(&spec);
-    let verdict = judge(&bytes, &spec);
-    assert!(verdict.verified, "{:#?}", verdict.claims);
-    let lowest = verdict.claim("containment").unwrap().bound.unwrap();
-    // Real trajectories stay above the bound, and one comes near it.
-    let found = falsify(&bytes, &spec, 200_000, 3).unwrap();
-    assert_eq!(found.violation, None);
-    let nearest = -0.8 + found.smallest_margin_hz;
-    assert!(
-        lowest <= nearest && nearest < lowest + 0.05,
-        "{lowest} {nearest}"
-    );
 }

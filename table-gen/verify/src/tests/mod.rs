@@ -1,97 +1,31 @@
-//! Whole verdicts, on tables made for the purpose.
+//! What needs to see the verifier's parts: its boxes and its tube against real trajectories. Whole
+//! verdicts are tested in the package `tests`.
 
 mod delay;
-mod mutants;
-mod paper;
-mod second_checker;
 mod tube;
 
-use std::sync::LazyLock;
+use rand::{Rng, SeedableRng};
+use rand_pcg::Pcg64Mcg;
 
-use firmware::table::{Law, TableView};
+/// Draws of a test.
+struct Random(Pcg64Mcg);
 
-use crate::{Verdict, verify};
-use model::spec::Spec;
-use synth::game::{Unwatched, Watch};
-use synth::pipeline;
-use synth::synthesis;
-
-/// A spec with Hold and a little of every uncertainty, on a grid of 435,600 cells.
-pub(super) const SMALL: [&str; 6] = [
-    "name=small",
-    "grid={lower=[-0.9,-0.4,-0.2,-0.2],upper=[0.1,3.2,2.0,2.0],width=[0.02,0.2,0.1,0.1],alignment=\"edges\"}",
-    "sampling.period_s=2.0",
-    "uncertainty.measurement=[0,0,0,0]",
-    "uncertainty.participation=0.01",
-    "uncertainty.loss_gw=[1.995,2.005]",
-];
-
-/// The small spec, with further overrides.
-pub(super) fn small(more: &[&str]) -> Spec {
-    let all: Vec<String> = SMALL.iter().chain(more).map(|s| (*s).to_owned()).collect();
-    Spec::load("gb-bi", &all).unwrap()
-}
-
-/// The dense table of a spec.
-pub(super) fn table(spec: &Spec) -> Vec<u8> {
-    let unwatched = |_: &'static str| Box::new(Unwatched) as Box<dyn Watch>;
-    let synthesis = synthesis::synthesise(spec, &unwatched).unwrap();
-    let watch = |_| Box::new(Unwatched) as Box<dyn Watch>;
-    let encoding = pipeline::Encoding::Dense;
-    pipeline::emit(spec, &synthesis, encoding, &watch)
-        .unwrap()
-        .bytes
-}
-
-pub(super) static SMALL_TABLE: LazyLock<Vec<u8>> = LazyLock::new(|| table(&small(&[])));
-pub(super) static PAPER_BI: LazyLock<Vec<u8>> =
-    LazyLock::new(|| table(&Spec::load("paper-bi", &[]).unwrap()));
-
-/// The verdict on a table.
-pub(super) fn judge(bytes: &[u8], spec: &Spec) -> Verdict {
-    verify(bytes, spec, &|_| true).unwrap()
-}
-
-/// Byte and bit at which a dense law stores a cell's entry, and the bits of an entry.
-pub(super) fn dense_entry(
-    view: &TableView<'_>,
-    law: Law,
-    cell: [u16; 4],
-) -> Option<(usize, usize)> {
-    let mut at = firmware::table::HEADER_LEN;
-    for other in Law::ALL {
-        let Some(entry) = view.header().laws[other as usize] else {
-            continue;
-        };
-        if other == law {
-            break;
-        }
-        at += (entry.domain_len + entry.inputs_len) as usize;
+impl Random {
+    fn new(seed: u64) -> Self {
+        Self(Pcg64Mcg::seed_from_u64(seed))
     }
-    let bytes = view.bytes();
-    let word = |i: usize| u16::from_le_bytes([bytes[at + 2 * i], bytes[at + 2 * i + 1]]);
-    let mut position = 0usize;
-    for axis in (0..4).rev() {
-        let (first, count) = (word(axis), word(4 + axis));
-        if cell[axis] < first || cell[axis] >= first + count {
-            return None;
-        }
-        position = position * usize::from(count) + usize::from(cell[axis] - first);
-    }
-    let bit = position * firmware::table::bits_per_entry(view.header().levels) as usize;
-    Some((at + firmware::table::DENSE_HEADER_LEN + bit / 8, bit % 8))
-}
 
-/// The table with a cell's entry replaced (0: outside, else level + 1) and sealed again.
-pub(super) fn with_entry(bytes: &[u8], law: Law, cell: [u16; 4], entry: u8) -> Vec<u8> {
-    let mut image = bytes.to_vec();
-    let view = TableView::parse(bytes).unwrap();
-    let bits = firmware::table::bits_per_entry(view.header().levels);
-    let (at, shift) = dense_entry(&view, law, cell).unwrap();
-    let mut pair = u16::from_le_bytes([image[at], image[at + 1]]);
-    let mask = ((1u16 << bits) - 1) << shift;
-    pair = (pair & !mask) | (u16::from(entry) << shift);
-    image[at..at + 2].copy_from_slice(&pair.to_le_bytes());
-    firmware::table::seal(&mut image).unwrap();
-    image
+    /// In \[0, 1\).
+    fn unit(&mut self) -> f64 {
+        (self.0.next_u64() >> 11) as f64 / (1u64 << 53) as f64
+    }
+
+    /// -1 or 1.
+    fn sign(&mut self) -> f64 {
+        if self.0.next_u64() >> 63 == 0 {
+            -1.0
+        } else {
+            1.0
+        }
+    }
 }

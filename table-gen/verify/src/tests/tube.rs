@@ -1,6 +1,6 @@
 //! The bound of f between the samples, held against real trajectories.
 
-use crate::adversaries::Random;
+use super::Random;
 use crate::closed_loop::Drive;
 use crate::segment::Segment;
 use model::interval::Interval;

@@ -1,14 +1,16 @@
 //! From "not proven" to "refuted": a search for a real trajectory that breaks a claim as the sets suggest.
 
-use super::adversaries::{BangBang, Constant, Random, Resonant};
-use super::closed_loop::Model;
-use super::path::phase_name;
-use super::replay::{Adversary, Breach, Replay, Sample};
-use super::tally::Violation;
-use super::verdict::{RealPath, RealPoint};
+use firmware::table::{TableError, TableView};
 use firmware::units::AXIS_F;
 use model::plant::STATES;
+use model::spec::Spec;
+use model::verdict::{ClaimName, RealPath, RealPoint, Verdict};
 
+use super::adversaries::{BangBang, Constant, Random, Resonant};
+use super::trajectory::{Adversary, Breach, Sample, Trajectories};
+
+/// Length of a trajectory \[s\] where the spec asks for ever.
+const OPEN_HORIZON_S: f64 = 300.0;
 /// Moments of the event that are tried where nothing else is uncertain.
 const MOMENTS: u32 = 4000;
 /// Trajectories that are tried where much is uncertain.
@@ -16,15 +18,49 @@ const TRIES: u64 = 400;
 /// Most control ticks of the whole search.
 const TICKS_MAX: u64 = 3_000_000;
 
-/// A real trajectory that breaks a claim in this way, if one is found.
-pub(crate) fn find(
-    replay: &Replay<'_>,
-    model: &Model,
-    kind: Violation,
+/// Searches a real trajectory for the failures of a verdict. The first that is refuted so becomes the
+/// verdict's counterexample: of several failures, the one with a real trajectory says most.
+///
+/// # Errors
+/// A table that the firmware rejects.
+pub fn refute(verdict: &mut Verdict, bytes: &[u8], spec: &Spec) -> Result<(), TableError> {
+    let table = TableView::parse(bytes)?;
+    let trajectories = Trajectories::new(&table, spec);
+    let horizon_s = spec.requirements.horizon_s.unwrap_or(OPEN_HORIZON_S);
+    let ticks = (horizon_s / trajectories.tick_s()).ceil() as u32;
+    let failures = std::mem::take(&mut verdict.failures);
+    let refuted = failures.iter().find_map(|failure| {
+        let real = find(&trajectories, spec, failure.claim, ticks)?;
+        let mut refuted = failure.clone();
+        refuted.real = Some(real);
+        Some(refuted)
+    });
+    verdict.failures = failures;
+    if refuted.is_some() {
+        verdict.counterexample = refuted;
+    }
+    Ok(())
+}
+
+/// Whether the loop is deterministic but for the moment of the event.
+fn is_exact(spec: &Spec) -> bool {
+    let uncertainty = &spec.uncertainty;
+    let [low, high] = uncertainty.loss_gw;
+    low == high
+        && uncertainty.participation == 0.0
+        && uncertainty.measurement == [0.0; STATES]
+        && uncertainty.initial.lower == uncertainty.initial.upper
+}
+
+/// A real trajectory that breaks a claim, if one is found.
+fn find(
+    trajectories: &Trajectories<'_>,
+    spec: &Spec,
+    claim: ClaimName,
     ticks: u32,
 ) -> Option<RealPath> {
     let tries = TICKS_MAX / u64::from(ticks.max(1));
-    if model.is_exact() {
+    if is_exact(spec) {
         let count = u64::from(MOMENTS).min(tries.max(1));
         return (0..count).find_map(|n| {
             let make = || -> Box<dyn Adversary> {
@@ -35,7 +71,7 @@ pub(crate) fn find(
                     error: 0.0,
                 })
             };
-            attempt(replay, kind, ticks, &make, "none")
+            attempt(trajectories, claim, ticks, &make, "none")
         });
     }
     (0..TRIES.min(tries.max(1))).find_map(|seed| {
@@ -53,7 +89,7 @@ pub(crate) fn find(
         };
         let resonant = || Resonant::new(seed);
         let run = |make: &dyn Fn() -> Box<dyn Adversary>, name: &str| {
-            attempt(replay, kind, ticks, make, name)
+            attempt(trajectories, claim, ticks, make, name)
         };
         run(&|| Box::new(nominal()), "middle of every range")
             .or_else(|| {
@@ -90,22 +126,23 @@ fn constant(seed: u64) -> Constant {
 
 /// Runs once to find a breach; once more to record it.
 fn attempt(
-    replay: &Replay<'_>,
-    kind: Violation,
+    trajectories: &Trajectories<'_>,
+    claim: ClaimName,
     ticks: u32,
     make: &dyn Fn() -> Box<dyn Adversary>,
     name: &str,
 ) -> Option<RealPath> {
-    let breach = replay.run(make().as_mut(), ticks, &mut |_| {})?;
-    if breach.kind != kind {
+    let breach = trajectories.run(make().as_mut(), ticks, &mut |_| {})?;
+    if breach.claim != claim {
         return None;
     }
     let mut samples = Vec::new();
-    replay.run(make().as_mut(), ticks, &mut |sample| samples.push(*sample));
+    trajectories.run(make().as_mut(), ticks, &mut |sample| samples.push(*sample));
     Some(real_path(breach, &samples, name))
 }
 
-pub(crate) fn real_path(breach: Breach, samples: &[Sample], adversary: &str) -> RealPath {
+/// A trajectory for people, from its samples: the event, then every tick.
+pub(super) fn real_path(breach: Breach, samples: &[Sample], adversary: &str) -> RealPath {
     let changed = |i: usize| {
         let (before, now) = (&samples[i.max(1) - 1], &samples[i]);
         i == 0 || i + 1 == samples.len() || (before.phase, before.level) != (now.phase, now.level)
@@ -114,30 +151,29 @@ pub(crate) fn real_path(breach: Breach, samples: &[Sample], adversary: &str) -> 
         .filter(|i| changed(*i))
         .map(|i| RealPoint {
             time_s: samples[i].time_s,
-            phase: phase_name(samples[i].phase),
+            phase: samples[i].phase,
             level: samples[i].level,
-            state: samples[i].x.map(|v| v / 1e6),
+            state: samples[i].x,
         })
         .collect();
-    let f = breach.f / 1e6;
-    let what = match breach.kind {
-        Violation::Containment => format!("f falls to {f:.4} Hz"),
-        Violation::Late => "I2 is not reached in time".to_owned(),
-        Violation::Left => format!("f leaves I2 at {f:.4} Hz under Hold"),
-        Violation::Uncovered => format!("no law has an entry at f = {f:.4} Hz"),
-        Violation::Handover => format!("C1 decides in I1, at f = {f:.4} Hz"),
-        Violation::Visits => "a lookup visits too much".to_owned(),
+    let f = breach.f_hz;
+    let what = match breach.claim {
+        ClaimName::Containment => format!("f falls to {f:.4} Hz"),
+        ClaimName::Stay => format!("f leaves I2 at {f:.4} Hz under Hold"),
+        ClaimName::Table => format!("no law has an entry at f = {f:.4} Hz"),
+        ClaimName::HandOver => format!("C1 decides in I1, at f = {f:.4} Hz"),
+        _ => "I2 is not reached in time".to_owned(),
     };
     RealPath {
         what,
         breach_s: breach.time_s,
         first_tick_s: samples.get(1).map_or(0.0, |sample| sample.time_s),
-        initial: samples.first().map_or([0.0; 4], |s| s.x.map(|v| v / 1e6)),
+        initial: samples.first().map_or([0.0; STATES], |s| s.x),
         adversary: adversary.to_owned(),
         points,
         frequency: samples
             .iter()
-            .map(|sample| [sample.time_s, sample.x[AXIS_F] / 1e6])
+            .map(|sample| [sample.time_s, sample.x[AXIS_F]])
             .collect(),
     }
 }

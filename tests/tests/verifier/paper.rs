@@ -1,7 +1,9 @@
 //! The paper's own cases, over their horizon.
 
-use super::{PAPER_BI, judge, table};
 use model::spec::Spec;
+use model::verdict::{ClaimName, Verdict};
+
+use super::{PAPER_BI, judge, table};
 
 #[test]
 fn the_papers_bidirectional_case_is_proven() {
@@ -12,8 +14,8 @@ fn the_papers_bidirectional_case_is_proven() {
     assert_eq!(verdict.spec_hash, verdict.table_spec_hash);
     let bound = |name| verdict.claim(name).unwrap().bound.unwrap();
     // A simulation of the event from one moment is one of the trajectories: the bounds must not be tighter.
-    assert!(bound("containment") < -0.45 && bound("containment") > -0.5);
-    assert!(bound("settle") >= 10.5 && bound("settle") <= 15.0);
+    assert!(bound(ClaimName::Containment) < -0.45 && bound(ClaimName::Containment) > -0.5);
+    assert!(bound(ClaimName::Settle) >= 10.5 && bound(ClaimName::Settle) <= 15.0);
 }
 
 #[test]
@@ -23,7 +25,7 @@ fn the_papers_unidirectional_case_is_proven() {
     assert!(verdict.verified, "{:#?}", verdict.claims);
     let bound = |name| verdict.claim(name).unwrap().bound.unwrap();
     // Measured independently for one moment of the event: lowest f -0.640 Hz, I2 13.45 s after the event.
-    assert!(bound("containment") < -0.640 && bound("containment") > -0.67);
+    assert!(bound(ClaimName::Containment) < -0.640 && bound(ClaimName::Containment) > -0.67);
     assert!(verdict.counts.event_to_inner_s.unwrap() >= 13.45);
 }
 
@@ -36,7 +38,10 @@ fn the_same_table_gives_the_same_verdict() {
 #[test]
 fn the_verdict_serialises_with_its_documented_keys() {
     let spec = Spec::load("paper-bi", &[]).unwrap();
-    let json = serde_json::to_value(judge(&PAPER_BI, &spec)).unwrap();
+    let verdict = judge(&PAPER_BI, &spec);
+    let json = serde_json::to_value(&verdict).unwrap();
+    let text = serde_json::to_string(&verdict).unwrap();
+    assert_eq!(serde_json::from_str::<Verdict>(&text).unwrap(), verdict);
     for key in [
         "verified",
         "claims",

@@ -1,45 +1,49 @@
-//! Adversaries for [`super::replay`]: fixed extremes, random bang-bang, and one that reads the state.
+//! Adversaries for [`super::trajectory`]: fixed extremes, random bang-bang, and one that reads the state.
 
-use firmware::phase::PhaseState;
-
-use super::replay::Adversary;
 use model::plant::STATES;
+use rand::{Rng, SeedableRng};
+use rand_pcg::Pcg64Mcg;
 
-/// A small deterministic generator (SplitMix64): the same seed gives the same trajectory everywhere.
+use super::trajectory::Adversary;
+use crate::simulation::chance::unit;
+
+/// Draws of a search: the same seed gives the same trajectory everywhere.
 #[derive(Debug, Clone)]
-pub(crate) struct Random(u64);
+pub struct Random(Pcg64Mcg);
 
 impl Random {
-    pub(crate) fn new(seed: u64) -> Self {
-        Self(seed)
+    /// The draws of a seed.
+    pub fn new(seed: u64) -> Self {
+        Self(Pcg64Mcg::seed_from_u64(seed))
     }
 
-    pub(crate) fn next(&mut self) -> u64 {
-        self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
-        z ^ (z >> 31)
+    /// Any number.
+    pub fn number(&mut self) -> u64 {
+        self.0.next_u64()
     }
 
     /// In \[0, 1\).
-    pub(crate) fn unit(&mut self) -> f64 {
-        (self.next() >> 11) as f64 / (1u64 << 53) as f64
+    pub fn unit(&mut self) -> f64 {
+        unit(&mut self.0)
     }
 
     /// -1 or 1.
-    pub(crate) fn sign(&mut self) -> f64 {
-        if self.next() >> 63 == 0 { -1.0 } else { 1.0 }
+    pub fn sign(&mut self) -> f64 {
+        if self.number() >> 63 == 0 { -1.0 } else { 1.0 }
     }
 }
 
 /// Everything constant, at a chosen point of its range.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Constant {
-    pub(crate) corner: [f64; STATES],
-    pub(crate) moment: f64,
-    pub(crate) share: f64,
-    pub(crate) error: f64,
+pub struct Constant {
+    /// Initial state, as a point of its box: each axis in \[0, 1\].
+    pub corner: [f64; STATES],
+    /// The event's moment within its tick, in \[0, 1\).
+    pub moment: f64,
+    /// Net power within its interval, in \[-1, 1\].
+    pub share: f64,
+    /// The estimate's error within its bound, in \[-1, 1\].
+    pub error: f64,
 }
 
 impl Adversary for Constant {
@@ -47,18 +51,20 @@ impl Adversary for Constant {
         (self.corner, self.moment)
     }
 
-    fn tick(&mut self, _: &[f64; STATES], _: PhaseState) -> (f64, [f64; STATES]) {
+    fn tick(&mut self, _: &[f64; STATES]) -> (f64, [f64; STATES]) {
         (self.share, [self.error; STATES])
     }
 }
 
 /// Corners of all ranges, switched at random.
 #[derive(Debug, Clone)]
-pub(crate) struct BangBang {
-    pub(crate) random: Random,
+pub struct BangBang {
+    /// Chooses.
+    pub random: Random,
     /// Mean ticks between switches of the net power.
-    pub(crate) hold_ticks: f64,
-    pub(crate) share: f64,
+    pub hold_ticks: f64,
+    /// Net power within its interval, in \[-1, 1\], until the first switch.
+    pub share: f64,
 }
 
 impl Adversary for BangBang {
@@ -67,7 +73,7 @@ impl Adversary for BangBang {
         (corner, self.random.unit())
     }
 
-    fn tick(&mut self, _: &[f64; STATES], _: PhaseState) -> (f64, [f64; STATES]) {
+    fn tick(&mut self, _: &[f64; STATES]) -> (f64, [f64; STATES]) {
         if self.random.unit() * self.hold_ticks < 1.0 {
             self.share = self.random.sign();
         }
@@ -79,16 +85,17 @@ impl Adversary for BangBang {
 /// Worst-case search: a linear functional of the state chooses the sign of the power (resonance with the slow
 /// oscillation), the errors push the estimate across cells at random. The parameters can be drawn and mutated.
 #[derive(Debug, Clone)]
-pub(crate) struct Resonant {
-    pub(crate) random: Random,
-    pub(crate) corner: [f64; STATES],
-    pub(crate) moment: f64,
-    pub(crate) direction: [f64; STATES],
-    pub(crate) level: f64,
+pub struct Resonant {
+    random: Random,
+    corner: [f64; STATES],
+    moment: f64,
+    direction: [f64; STATES],
+    level: f64,
 }
 
 impl Resonant {
-    pub(crate) fn new(seed: u64) -> Self {
+    /// All parameters drawn.
+    pub fn new(seed: u64) -> Self {
         let mut random = Random::new(seed);
         Self {
             corner: std::array::from_fn(|_| if random.sign() > 0.0 { 1.0 } else { 0.0 }),
@@ -100,14 +107,14 @@ impl Resonant {
     }
 
     /// A neighbour: one parameter drawn anew, all others moved a little.
-    pub(crate) fn mutated(&self, seed: u64) -> Self {
+    pub fn mutated(&self, seed: u64) -> Self {
         let mut random = Random::new(seed);
         let mut out = self.clone();
         let near = |value: f64, random: &mut Random| value + 0.1 * (2.0 * random.unit() - 1.0);
         out.direction = out.direction.map(|value| near(value, &mut random));
         out.level = near(out.level, &mut random);
         out.moment = near(out.moment, &mut random).clamp(0.0, 0.999);
-        match random.next() % 6 {
+        match random.number() % 6 {
             axis @ 0..=3 => out.corner[axis as usize] = 1.0 - out.corner[axis as usize],
             4 => out.level = 2.0 * random.unit() - 1.0,
             _ => out.moment = random.unit(),
@@ -122,13 +129,13 @@ impl Adversary for Resonant {
         (self.corner, self.moment)
     }
 
-    fn tick(&mut self, x: &[f64; STATES], _: PhaseState) -> (f64, [f64; STATES]) {
+    fn tick(&mut self, x: &[f64; STATES]) -> (f64, [f64; STATES]) {
         // 1 Hz weighs as much as 5 GW: the governor's gain.
         let scaled = 5.0 * self.direction[0] * x[0]
             + self.direction[1] * x[1]
             + self.direction[2] * x[2]
             + self.direction[3] * x[3];
-        let share = (scaled - self.level * 1e6).signum();
+        let share = (scaled - self.level).signum();
         let error = std::array::from_fn(|_| self.random.sign());
         (share, error)
     }

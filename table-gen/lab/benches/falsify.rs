@@ -1,6 +1,6 @@
 //! The falsifier against every shipped spec's table: at least 10^7 control steps each, and no violation.
 //!
-//! `cargo bench -p verify --bench falsify`. The tables are made here as `build` makes them.
+//! `cargo bench -p lab --bench falsify`. The tables are made here as `build` makes them.
 
 #![allow(
     clippy::unwrap_used,
@@ -10,10 +10,10 @@
 
 use std::time::Instant;
 
+use lab::falsify::falsify;
 use model::spec::Spec;
 use synth::game::{Unwatched, Watch};
 use synth::{pipeline, synthesis};
-use verify::falsify::falsify;
 
 const STEPS: u64 = 10_000_000;
 

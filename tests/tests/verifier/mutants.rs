@@ -3,14 +3,15 @@
 use firmware::phase::{Phase, PhaseState, Step};
 use firmware::table::{HEADER_LEN, Header, Law, LawEntry, TableView, seal, write_header};
 
-use super::{PAPER_BI, SMALL_TABLE, judge, small, with_entry};
-use crate::adversaries::Constant;
-use crate::closed_loop::Model;
-use crate::replay::Replay;
-use crate::{Verdict, VerifyError, verify};
+use lab::falsify::adversaries::Constant;
+use lab::falsify::trajectory::Trajectories;
 use model::spec::Spec;
+use model::verdict::{ClaimName, Verdict};
+use verify::{VerifyError, verify};
 
-fn fails(verdict: &Verdict, claim: &str) {
+use super::{PAPER_BI, SMALL_TABLE, judge, small, with_entry};
+
+fn fails(verdict: &Verdict, claim: ClaimName) {
     assert!(!verdict.verified);
     assert!(
         !verdict.claim(claim).unwrap().holds,
@@ -22,8 +23,7 @@ fn fails(verdict: &Verdict, claim: &str) {
 /// Cell and level of the decisions that the nominal trajectory takes, in their order.
 fn decisions(bytes: &[u8], spec: &Spec, ticks: u32) -> Vec<(Phase, [u16; 4], u8)> {
     let table = TableView::parse(bytes).unwrap();
-    let model = Model::new(&table, spec);
-    let replay = Replay::new(&table, &model, [-1e9, 1e9], u32::MAX);
+    let trajectories = Trajectories::new(&table, spec);
     let mut nominal = Constant {
         corner: [0.5; 4],
         moment: 0.5,
@@ -32,12 +32,12 @@ fn decisions(bytes: &[u8], spec: &Spec, ticks: u32) -> Vec<(Phase, [u16; 4], u8)
     };
     let (mut out, mut state) = (Vec::new(), PhaseState::INITIAL);
     let mut first = true;
-    replay.run(&mut nominal, ticks, &mut |sample| {
+    trajectories.run(&mut nominal, ticks, &mut |sample| {
         // The first sample is the event, not a tick.
         if std::mem::take(&mut first) {
             return;
         }
-        let measured = firmware::units::State(sample.x.map(|v| v.floor() as i32));
+        let measured = firmware::units::State(sample.x.map(|v| (v * 1e6).floor() as i32));
         let decides = state.ticks_left == 0;
         let (next, step) = state.step(&table, measured);
         if decides
@@ -77,9 +77,9 @@ fn a_cut_in_its_reach_is_rejected() {
         assert_eq!(phase, Phase::C1);
         let cut = with_entry(&SMALL_TABLE, Law::C1, cell, 0);
         let verdict = judge(&cut, &spec);
-        fails(&verdict, "table");
+        fails(&verdict, ClaimName::Table);
         let example = verdict.counterexample.unwrap();
-        assert_eq!(example.claim, "table");
+        assert_eq!(example.claim, ClaimName::Table);
         assert!(
             example.real.is_some(),
             "the nominal trajectory meets the hole"
@@ -89,7 +89,7 @@ fn a_cut_in_its_reach_is_rejected() {
     let (phase, cell, _) = decisions(&PAPER_BI, &spec, 300)[1];
     assert_eq!(phase, Phase::C1);
     let verdict = judge(&with_entry(&PAPER_BI, Law::C1, cell, 0), &spec);
-    fails(&verdict, "table");
+    fails(&verdict, ClaimName::Table);
     assert!(verdict.counterexample.unwrap().real.is_some());
 }
 
@@ -135,7 +135,7 @@ fn swapped_phases_are_rejected() {
     swapped[HEADER_LEN + len2..HEADER_LEN + len2 + len1].copy_from_slice(&blocks[..len1]);
     seal(&mut swapped).unwrap();
     // The laws are robust enough to do each other's work here; but then C1 is in force where C2 should be.
-    fails(&judge(&swapped, &spec), "hand-over");
+    fails(&judge(&swapped, &spec), ClaimName::HandOver);
 }
 
 #[test]
@@ -149,7 +149,7 @@ fn a_grid_shifted_by_a_cell_is_rejected() {
         };
         let spec = small(&[]);
         let verdict = judge(&with_header(&SMALL_TABLE, shift), &spec);
-        fails(&verdict, "header");
+        fails(&verdict, ClaimName::Header);
     }
     // On the frequency's axis it breaks the loop as well.
     let spec = small(&[]);
@@ -159,7 +159,7 @@ fn a_grid_shifted_by_a_cell_is_rejected() {
         lower[0] += grid.width()[0] as i32;
         header.grid = firmware::grid::Grid::new(lower, grid.width(), grid.count()).unwrap();
     });
-    fails(&judge(&shifted, &spec), "stay");
+    fails(&judge(&shifted, &spec), ClaimName::Stay);
 }
 
 #[test]
@@ -178,10 +178,10 @@ fn wider_uncertainty_than_proven_is_rejected() {
 #[test]
 fn a_slower_settling_than_asked_is_rejected() {
     let verdict = judge(&SMALL_TABLE, &small(&["requirements.settle_within_s=3"]));
-    fails(&verdict, "settle");
+    fails(&verdict, ClaimName::Settle);
     let spec = Spec::load("paper-bi", &["requirements.settle_within_s=5".to_owned()]).unwrap();
     let verdict = judge(&PAPER_BI, &spec);
-    fails(&verdict, "settle");
+    fails(&verdict, ClaimName::Settle);
     assert!(verdict.counterexample.unwrap().real.is_some());
 }
 
@@ -189,7 +189,7 @@ fn a_slower_settling_than_asked_is_rejected() {
 fn a_higher_containment_than_kept_is_refuted() {
     let spec = Spec::load("paper-bi", &["requirements.containment_hz=-0.4".to_owned()]).unwrap();
     let verdict = judge(&PAPER_BI, &spec);
-    fails(&verdict, "containment");
+    fails(&verdict, ClaimName::Containment);
     let real = verdict.counterexample.unwrap().real.unwrap();
     assert!(real.what.contains("-0.40"), "{}", real.what);
 }

@@ -1,0 +1,166 @@
+//! The falsifier: adversaries that try to break a table, with the firmware's own control loop.
+//!
+//! It proves nothing, and it shares nothing with the proof but the spec: a claim that the verifier
+//! accepts and the falsifier breaks is a defect of the verifier. This package does not reach the
+//! verifier's.
+//!
+//! | module | holds |
+//! |---|---|
+//! | [`trajectory`] | plant and firmware, from the event until a claim breaks |
+//! | [`adversaries`] | who chooses the disturbances |
+//! | [`witness`] | for a verdict's failure: a real trajectory that shows it |
+//!
+//! The search takes turns between three kinds of trajectory:
+//!
+//! | kind | chooses |
+//! |---|---|
+//! | constant | a corner of every range, held |
+//! | bang-bang | corners switched at random, at a random pace |
+//! | resonant | the sign of the net power by a linear functional of the state; the best functional so far is mutated |
+//!
+//! The search is deterministic in its seed.
+
+pub mod adversaries;
+pub mod trajectory;
+pub mod witness;
+
+use firmware::table::{TableError, TableView};
+use model::spec::Spec;
+use model::verdict::RealPath;
+use serde::Serialize;
+
+use adversaries::{BangBang, Constant, Random, Resonant};
+use trajectory::{Adversary, Breach, Trajectories};
+use witness::real_path;
+
+/// Length of a trajectory without a horizon \[s\]: several periods of the slow oscillation (28 s for the paper's plant).
+const TRAJECTORY_S: f64 = 120.0;
+
+/// What a search found.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Falsification {
+    /// Control steps (ticks) simulated.
+    pub steps: u64,
+    /// Trajectories simulated.
+    pub trajectories: u64,
+    /// Smallest distance from breaking a claim \[Hz\]: f above containment, and inside I2 under Hold; at ticks.
+    pub smallest_margin_hz: f64,
+    /// A trajectory that breaks a claim.
+    pub violation: Option<RealPath>,
+}
+
+/// Searches for a trajectory that breaks a claim, for at least so many control steps or until one is found.
+///
+/// # Errors
+/// A table that the firmware rejects.
+pub fn falsify(
+    bytes: &[u8],
+    spec: &Spec,
+    steps: u64,
+    seed: u64,
+) -> Result<Falsification, TableError> {
+    let table = TableView::parse(bytes)?;
+    let trajectories = Trajectories::new(&table, spec);
+    let length_s = spec.requirements.horizon_s.unwrap_or(TRAJECTORY_S);
+    let search = Search {
+        ticks: (length_s / trajectories.tick_s()).ceil() as u32,
+        trajectories,
+    };
+    Ok(search.run(steps, seed))
+}
+
+struct Search<'a> {
+    trajectories: Trajectories<'a>,
+    ticks: u32,
+}
+
+/// One trajectory's outcome.
+struct Outcome {
+    steps: u64,
+    margin_hz: f64,
+    breach: Option<Breach>,
+}
+
+impl Search<'_> {
+    fn run(&self, steps: u64, seed: u64) -> Falsification {
+        let mut out = Falsification {
+            steps: 0,
+            trajectories: 0,
+            smallest_margin_hz: f64::INFINITY,
+            violation: None,
+        };
+        let mut random = Random::new(seed);
+        let mut best: Option<(f64, Resonant)> = None;
+        while out.steps < steps {
+            let draw = random.number();
+            let kind = out.trajectories % 4;
+            let resonant = match &best {
+                // Every other resonant trajectory starts from the best so far.
+                Some((_, best)) if kind == 3 => best.mutated(draw),
+                _ => Resonant::new(draw),
+            };
+            let make = || -> Box<dyn Adversary> {
+                match kind {
+                    0 => Box::new(constant(draw)),
+                    1 => Box::new(bang_bang(draw)),
+                    _ => Box::new(resonant.clone()),
+                }
+            };
+            let outcome = self.outcome(make().as_mut());
+            out.steps += outcome.steps;
+            out.trajectories += 1;
+            out.smallest_margin_hz = out.smallest_margin_hz.min(outcome.margin_hz);
+            if kind >= 2
+                && best
+                    .as_ref()
+                    .is_none_or(|(margin, _)| outcome.margin_hz < *margin)
+            {
+                best = Some((outcome.margin_hz, resonant.clone()));
+            }
+            if let Some(breach) = outcome.breach {
+                let mut samples = Vec::new();
+                self.trajectories
+                    .run(make().as_mut(), self.ticks, &mut |sample| {
+                        samples.push(*sample);
+                    });
+                let name = format!("kind {kind} of trajectory, draw {draw}");
+                out.violation = Some(real_path(breach, &samples, &name));
+                break;
+            }
+        }
+        out
+    }
+
+    fn outcome(&self, adversary: &mut dyn Adversary) -> Outcome {
+        let mut margin = f64::INFINITY;
+        let breach = self.trajectories.run(adversary, self.ticks, &mut |sample| {
+            margin = margin.min(self.trajectories.margin_hz(sample));
+        });
+        Outcome {
+            steps: breach.map_or(u64::from(self.ticks), |breach| u64::from(breach.tick) + 1),
+            margin_hz: margin,
+            breach,
+        }
+    }
+}
+
+fn constant(draw: u64) -> Constant {
+    let mut random = Random::new(draw);
+    Constant {
+        corner: std::array::from_fn(|_| if random.sign() > 0.0 { 1.0 } else { 0.0 }),
+        moment: random.unit(),
+        share: random.sign(),
+        error: random.sign(),
+    }
+}
+
+fn bang_bang(draw: u64) -> BangBang {
+    let mut random = Random::new(draw);
+    // From every tick to every 100 ticks, evenly on a logarithmic scale.
+    let hold_ticks = 100f64.powf(random.unit());
+    BangBang {
+        share: random.sign(),
+        random,
+        hold_ticks,
+    }
+}

@@ -1,0 +1,249 @@
+//! One real trajectory of the closed loop: the firmware's control loop against an adversary.
+//!
+//! The plant comes from the spec alone, integrated in plain numbers by its exact step; what is
+//! commanded comes from the firmware alone. Nothing of the verifier is used, so that an error in its
+//! model does not hide itself here. A trajectory that breaks a claim by more than the arithmetic's
+//! error is a real counterexample, whatever the sets say.
+
+use std::collections::VecDeque;
+
+use firmware::control_loop::{ControlLoop, Source};
+use firmware::phase::Phase;
+use firmware::prediction::History;
+use firmware::table::{Law, TableView};
+use firmware::units::{AXIS_F, State};
+use model::plant::{GridPlant, STATES};
+use model::propagator::Propagator;
+use model::spec::Spec;
+use model::verdict::ClaimName;
+
+/// Pieces of a tick at which the frequency between ticks is looked at.
+const PIECES: usize = 5;
+/// Distance past a limit that counts \[Hz\]: far above the arithmetic's error, far below anything that
+/// matters.
+const MARGIN_HZ: f64 = 1e-6;
+/// Micro-units in a unit.
+const MICRO: f64 = firmware::units::MICRO as f64;
+
+/// What is left to chance and malice.
+pub trait Adversary {
+    /// Initial state as a point of the initial box, each axis in \[0, 1\], and the moment of the event
+    /// within its tick, in \[0, 1\).
+    fn event(&mut self) -> ([f64; STATES], f64);
+    /// For the tick that begins, at a state in Hz and GW: the net power within its interval and the
+    /// estimate's error within its bound, both in \[-1, 1\]. The error goes into this tick's
+    /// measurement, the power acts until the next.
+    fn tick(&mut self, x: &[f64; STATES]) -> (f64, [f64; STATES]);
+}
+
+/// The loop as it stands at a tick.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Sample {
+    /// Time from the event \[s\].
+    pub time_s: f64,
+    /// Real state: f \[Hz\], g, l, p \[GW\].
+    pub x: [f64; STATES],
+    /// Law in force.
+    pub phase: Phase,
+    /// Its input level.
+    pub level: u8,
+    /// The phase whose command acts; behind `phase` by the delay.
+    pub acting: Phase,
+}
+
+/// How a trajectory broke a claim.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Breach {
+    /// The claim.
+    pub claim: ClaimName,
+    /// Time from the event \[s\].
+    pub time_s: f64,
+    /// Real frequency deviation \[Hz\].
+    pub f_hz: f64,
+    /// Ticks since the first after the event.
+    pub tick: u32,
+}
+
+/// A command on its way to the power that it asks for.
+#[derive(Debug, Clone, Copy)]
+struct Command {
+    phase: Phase,
+    /// Share of the fleet, in \[0, 1\].
+    participation: f64,
+}
+
+impl Command {
+    const NONE: Self = Self {
+        phase: Phase::NoControl,
+        participation: 0.0,
+    };
+}
+
+/// A table on a spec's plant, prepared for many trajectories.
+pub struct Trajectories<'a> {
+    table: &'a TableView<'a>,
+    spec: &'a Spec,
+    plant: GridPlant,
+    tick_s: f64,
+    /// The plant over 1..=PIECES pieces of a tick.
+    pieces: Vec<Propagator>,
+    settle_ticks: u32,
+}
+
+impl<'a> Trajectories<'a> {
+    /// Trajectories of a table on a spec's plant.
+    pub fn new(table: &'a TableView<'a>, spec: &'a Spec) -> Self {
+        let plant = GridPlant::new(spec);
+        let tick_s = f64::from(spec.sampling.watch_ms()) / 1000.0;
+        let length_s = tick_s / PIECES as f64;
+        Self {
+            table,
+            spec,
+            plant,
+            tick_s,
+            pieces: (1..=PIECES)
+                .map(|n| Propagator::new(&plant, length_s * n as f64))
+                .collect(),
+            settle_ticks: (spec.requirements.settle_within_s / tick_s).floor() as u32,
+        }
+    }
+
+    /// Length of a tick \[s\].
+    pub fn tick_s(&self) -> f64 {
+        self.tick_s
+    }
+
+    /// How far a sample is from breaking a claim \[Hz\]; not positive where it does.
+    pub fn margin_hz(&self, sample: &Sample) -> f64 {
+        let f = sample.x[AXIS_F];
+        let limit = self.spec.requirements.containment_hz;
+        let contained = limit.map_or(f64::INFINITY, |limit| f - limit);
+        if sample.acting != Phase::Hold {
+            return contained;
+        }
+        let [low, high] = self.spec.requirements.inner_hz;
+        contained.min(f - low).min(high - f)
+    }
+
+    /// Runs a trajectory for a number of ticks, or until it breaks a claim; `see` is shown the event
+    /// and every tick.
+    pub fn run(
+        &self,
+        adversary: &mut dyn Adversary,
+        ticks: u32,
+        see: &mut dyn FnMut(&Sample),
+    ) -> Option<Breach> {
+        let uncertainty = &self.spec.uncertainty;
+        let (corner, moment) = adversary.event();
+        let initial = &uncertainty.initial;
+        let mut x: [f64; STATES] = std::array::from_fn(|d| {
+            initial.lower[d] + corner[d] * (initial.upper[d] - initial.lower[d])
+        });
+        let offset_s = moment * self.tick_s;
+        see(&Sample {
+            time_s: 0.0,
+            x,
+            phase: Phase::NoControl,
+            level: 0,
+            acting: Phase::NoControl,
+        });
+        let late = self.spec.sampling.ticks_of(uncertainty.actuation_delay_s);
+        let mut under_way: VecDeque<Command> = (0..late).map(|_| Command::NONE).collect();
+        let (share, _) = adversary.tick(&x);
+        let power = self.net_power(Command::NONE, share);
+        x = Propagator::new(&self.plant, offset_s).step(&x, power);
+        let mut control = ControlLoop::with_table(Ok(self.table.clone()));
+        // What the device predicts, for the claim that C1 hands over: the loop does not show it.
+        let mut history = History::NONE;
+        let mut since = None;
+        for tick in 0..ticks {
+            let time_s = offset_s + f64::from(tick) * self.tick_s;
+            let (share, error) = adversary.tick(&x);
+            let measured = State(std::array::from_fn(|d| {
+                ((x[d] + error[d] * uncertainty.measurement[d]) * MICRO).floor() as i32
+            }));
+            let decided_on = match self.table.prediction() {
+                Some(prediction) => prediction.predict(measured, &history),
+                None => measured,
+            };
+            let action = control.step(measured);
+            let state = control.phase_state();
+            history.push(state.level);
+            under_way.push_back(Command {
+                phase: state.phase,
+                participation: f64::from(action.participation.ppm()) / MICRO,
+            });
+            // As many as there are ticks of delay, and this one.
+            let acting = under_way.pop_front().unwrap_or(Command::NONE);
+            see(&Sample {
+                time_s,
+                x,
+                phase: state.phase,
+                level: state.level,
+                acting: acting.phase,
+            });
+            let breach = |claim, f_hz| {
+                Some(Breach {
+                    claim,
+                    time_s,
+                    f_hz,
+                    tick,
+                })
+            };
+            if action.source != Source::Table {
+                return breach(ClaimName::Table, x[AXIS_F]);
+            }
+            let decided = state.ticks_left + 1 == self.table.header().period_ticks;
+            if decided && state.phase == Phase::C1 && self.is_for_c2(decided_on) {
+                return breach(ClaimName::HandOver, x[AXIS_F]);
+            }
+            match state.phase {
+                Phase::C1 | Phase::C2 => {
+                    let since = *since.get_or_insert(tick.saturating_sub(1));
+                    if tick - since > self.settle_ticks {
+                        return breach(ClaimName::Settle, x[AXIS_F]);
+                    }
+                }
+                _ => since = None,
+            }
+            let power = self.net_power(acting, share);
+            for piece in &self.pieces {
+                let f = piece.step(&x, power)[AXIS_F];
+                if let Some(claim) = self.broken(acting.phase, f) {
+                    return breach(claim, f);
+                }
+            }
+            x = self.pieces.last().map_or(x, |tick| tick.step(&x, power));
+        }
+        None
+    }
+
+    /// Whether C2 should decide on a state: f is in I1 and the table has that law.
+    fn is_for_c2(&self, state: State) -> bool {
+        self.table.law(Law::C2).is_some() && self.table.header().outer.contains(state)
+    }
+
+    fn broken(&self, acting: Phase, f: f64) -> Option<ClaimName> {
+        let requirements = &self.spec.requirements;
+        let limit = requirements.containment_hz;
+        if limit.is_some_and(|limit| f < limit - MARGIN_HZ) {
+            return Some(ClaimName::Containment);
+        }
+        let [low, high] = requirements.inner_hz;
+        let outside = f < low - MARGIN_HZ || f > high + MARGIN_HZ;
+        (acting == Phase::Hold && outside).then_some(ClaimName::Stay)
+    }
+
+    /// `P u' - w` \[GW\] at a point of its interval: u' within the participation error and at most the
+    /// whole fleet, w within its band; the ends are -1 and 1.
+    fn net_power(&self, command: Command, share: f64) -> f64 {
+        let uncertainty = &self.spec.uncertainty;
+        let error = uncertainty.participation;
+        let least = (command.participation * (1.0 - error)).max(0.0);
+        let most = (command.participation * (1.0 + error)).min(1.0);
+        let [loss_least, loss_most] = uncertainty.loss_gw;
+        let low = self.plant.fleet * least - loss_most;
+        let high = self.plant.fleet * most - loss_least;
+        0.5 * (low + high) + 0.5 * share.clamp(-1.0, 1.0) * (high - low)
+    }
+}
