@@ -7,7 +7,7 @@ use std::sync::OnceLock;
 use firmware::table::TableView;
 use lab::counterfactual::{Question, answer};
 use lab::fleet::{self, FleetConfig};
-use lab::replay::trace;
+use lab::record::{self, ReadOptions};
 use lab::simulation::baseline;
 use lab::simulation::beyond::Disturbances;
 use lab::simulation::beyond::file::ScenarioFile;
@@ -242,7 +242,7 @@ fn the_record_of_2019_is_explained_and_answered() {
     }
     let (spec, bytes) = paper("paper-bi");
     let table = TableView::parse(bytes).unwrap();
-    let trace = trace::read(&path, None).unwrap();
+    let trace = record::read(&path, &ReadOptions::default()).unwrap();
     let question = Question {
         draws: 4,
         ..Question::PAPER

@@ -4,6 +4,7 @@
 //! |---|---|---|
 //! | [`simulation`] | a table, or a baseline | the grid's frequency in time |
 //! | [`fleet`] | a table | the same with one firmware for each charger |
+//! | [`record`] | a recorded frequency as text | samples at one interval |
 //! | [`replay`] | a recorded frequency | what the firmware would have done |
 //! | [`falsify`] | a table and a spec | a real trajectory that breaks a claim, if a search finds one |
 //! | [`counterfactual`] | a recorded event | what it would have been with the chargers |
@@ -16,6 +17,7 @@ pub mod counterfactual;
 pub mod falsify;
 pub mod fleet;
 pub mod monitor;
+pub mod record;
 pub mod replay;
 pub mod report;
 pub mod robustness;

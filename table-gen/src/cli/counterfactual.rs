@@ -3,7 +3,7 @@
 use firmware::table::TableView;
 use serde::Serialize;
 
-use super::trace::TraceArgs;
+use super::record::RecordArgs;
 use super::{Failure, OutputArgs, output, plot};
 use lab::counterfactual::{self, Counterfactual, LIMITS, PlantAnswer, Question};
 
@@ -14,7 +14,7 @@ const DRAWS_MAX: usize = 100_000;
 #[derive(Debug, clap::Args)]
 pub(super) struct CounterfactualArgs {
     #[command(flatten)]
-    trace: TraceArgs,
+    record: RecordArgs,
     #[command(flatten)]
     output: OutputArgs,
     /// Powers of the fleet to try [GW]
@@ -82,15 +82,15 @@ impl CounterfactualArgs {
 
 /// Runs the command.
 pub(super) fn run(args: &CounterfactualArgs) -> Result<(), Failure> {
-    let spec = args.trace.spec()?;
+    let spec = args.record.spec()?;
     let question = args.question()?;
-    let (trace, bytes) = args.trace.load(&spec)?;
+    let (record, bytes) = args.record.load(&spec)?;
     let table =
         TableView::parse(&bytes).map_err(|error| Failure::BadInput(format!("{error:?}")))?;
-    let found = counterfactual::answer(&spec, &table, &trace, &question).map_err(Failure::bad)?;
+    let found = counterfactual::answer(&spec, &table, &record, &question).map_err(Failure::bad)?;
     let report = CounterfactualReport {
         spec: &spec.name,
-        start: &trace.start,
+        start: &record.start,
         recorded_nadir_hz: found.recorded_nadir_hz,
         relay_s: found.relay_s,
         plants: &found.plants,

@@ -4,18 +4,15 @@ use std::path::PathBuf;
 
 use serde::Serialize;
 
+use super::record::RecordOptions;
 use super::{Failure, OutputArgs, SpecArgs, output};
-use lab::replay::trace;
 use lab::robustness::{Sample, robustness};
 use model::logic::{self, Compiled};
-
-/// Nominal frequency \[Hz\].
-const NOMINAL_HZ: f64 = 50.0;
 
 /// Arguments of `formula`.
 #[derive(Debug, clap::Args)]
 pub(super) struct FormulaArgs {
-    /// The formula, e.g. 'G(f >= -0.8) & G(!(f in I1) -> F[<=60s] f in I1)'; f is the deviation from 50 Hz
+    /// The formula, e.g. 'G(f >= -0.8) & G(!(f in I1) -> F[<=60s] f in I1)'; f is the deviation from nominal
     #[arg(value_name = "FORMULA")]
     formula: String,
     #[command(flatten)]
@@ -25,6 +22,8 @@ pub(super) struct FormulaArgs {
     /// Instead of compiling to games: the formula's robustness on a recorded frequency (CSV as for `replay`)
     #[arg(long, value_name = "TRACE.csv")]
     trace: Option<PathBuf>,
+    #[command(flatten)]
+    record: RecordOptions,
 }
 
 #[derive(Debug, Serialize)]
@@ -46,13 +45,12 @@ pub(super) fn run(args: &FormulaArgs) -> Result<(), Failure> {
         robustness: None,
     };
     if let Some(path) = &args.trace {
-        let trace = trace::read(path, None).map_err(Failure::bad)?;
-        let samples: Vec<Sample> = trace
-            .samples
-            .iter()
-            .map(|sample| Sample {
-                time_s: sample.time_s,
-                f_hz: sample.frequency_hz - NOMINAL_HZ,
+        let record = args.record.read(path)?;
+        let samples: Vec<Sample> = record
+            .deviations()
+            .map(|(time_s, f_hz)| Sample {
+                time_s,
+                f_hz,
                 loss_gw: f64::NAN,
             })
             .collect();

@@ -17,12 +17,12 @@ mod monte_carlo;
 mod output;
 mod plot;
 mod progress;
+mod record;
 mod replay;
 mod report;
 mod simulate;
 mod synth;
 mod time_left;
-mod trace;
 mod verify;
 
 use std::process::ExitCode;

@@ -5,16 +5,16 @@ use std::path::PathBuf;
 use firmware::table::TableView;
 use serde::Serialize;
 
-use super::trace::TraceArgs;
+use super::record::RecordArgs;
 use super::{Failure, OutputArgs, output, plot, simulate};
-use lab::replay::{Replay, replay};
+use lab::replay::{FaultCount, REACTION_STEP_MAX_S, Replay, replay};
 use lab::simulation::trajectory::PhaseSpan;
 
 /// Arguments of `replay`.
 #[derive(Debug, clap::Args)]
 pub(super) struct ReplayArgs {
     #[command(flatten)]
-    trace: TraceArgs,
+    record: RecordArgs,
     #[command(flatten)]
     output: OutputArgs,
     /// Write time, frequency and participation of every tick as CSV
@@ -30,49 +30,58 @@ struct ReplayReport<'r> {
     spec: &'r str,
     start: &'r str,
     samples: usize,
+    step_s: f64,
+    skipped_rows: usize,
     filled_s: f64,
     onset_s: Option<f64>,
     first_response_s: Option<f64>,
     reaction_s: Option<f64>,
     false_triggers: usize,
     max_participation: f64,
+    faults: &'r [FaultCount],
     phases: &'r [PhaseSpan],
 }
 
 /// Runs the command.
 pub(super) fn run(args: &ReplayArgs) -> Result<(), Failure> {
-    let spec = args.trace.spec()?;
-    let (trace, bytes) = args.trace.load(&spec)?;
+    let spec = args.record.spec()?;
+    let (record, bytes) = args.record.load(&spec)?;
     let table =
         TableView::parse(&bytes).map_err(|error| Failure::BadInput(format!("{error:?}")))?;
-    let result = replay(&table, &trace)
-        .map_err(|error| Failure::BadInput(format!("the observer cannot be made: {error:?}")))?;
+    let result = replay(&table, &record)
+        .map_err(|error| Failure::BadInput(format!("the charger rejects the table: {error:?}")))?;
     if let Some(path) = &args.csv {
         write_csv(path, &result)?;
     }
-    let reaction_s = match (result.onset_s, result.first_response_s) {
-        (Some(onset), Some(first)) => Some(first - onset),
-        _ => None,
-    };
+    let reaction_s = result.reaction_s();
     let report = ReplayReport {
         spec: &spec.name,
-        start: &trace.start,
-        samples: trace.samples.len(),
-        filled_s: trace.filled_s,
+        start: &record.start,
+        samples: record.samples.len(),
+        step_s: record.step_s,
+        skipped_rows: record.skipped.len(),
+        filled_s: record.filled_s,
         onset_s: result.onset_s,
         first_response_s: result.first_response_s,
         reaction_s,
         false_triggers: result.false_triggers,
         max_participation: result.max_participation,
+        faults: &result.faults,
         phases: &result.phases,
     };
     if args.output.json {
         return output::json(&report);
     }
     output::line(format_args!(
-        "{} samples from {}",
-        report.samples, report.start
+        "{} samples from {}, {} s apart",
+        report.samples, report.start, report.step_s
     ));
+    if record.step_s > REACTION_STEP_MAX_S {
+        output::line(format_args!(
+            "samples more than {REACTION_STEP_MAX_S} s apart do not show when an event began: no onset, \
+             no reaction time"
+        ));
+    }
     let mut rows = output::table(&["event", "value"]);
     rows.add_row(["onset", &format!("{} s", output::seconds(report.onset_s))]);
     rows.add_row([
@@ -81,7 +90,10 @@ pub(super) fn run(args: &ReplayArgs) -> Result<(), Failure> {
     ]);
     rows.add_row([
         "reaction after onset",
-        &format!("{} s", output::seconds(reaction_s)),
+        &reaction_s.map_or_else(
+            || "-".to_owned(),
+            |reaction_s| format!("{reaction_s:.2} s, {} s less at most", report.step_s),
+        ),
     ]);
     rows.add_row([
         "responses before the onset",
@@ -91,10 +103,16 @@ pub(super) fn run(args: &ReplayArgs) -> Result<(), Failure> {
         "largest participation",
         &format!("{:.3}", report.max_participation),
     ]);
+    for count in report.faults {
+        rows.add_row([
+            &format!("ticks with the fault {}", count.fault),
+            &count.ticks.to_string(),
+        ]);
+    }
     output::line(rows);
     simulate::phases(&result.phases);
     if args.plot {
-        let points: Vec<(f64, f64)> = trace
+        let points: Vec<(f64, f64)> = record
             .samples
             .iter()
             .map(|sample| (sample.time_s, sample.frequency_hz))

@@ -7,14 +7,15 @@ use serde::Serialize;
 use serde::de::DeserializeOwned;
 
 use super::files::write_all;
+use super::record::RecordOptions;
 use super::{Failure, OutputArgs, SpecArgs, output, progress};
 use lab::counterfactual::{self, Question};
 use lab::fleet::{self, FleetConfig, INSTANCES_MAX};
+use lab::record::Record;
 use lab::replay;
-use lab::replay::trace::{self, Trace};
 use lab::report::section::Section;
 use lab::report::study::Study;
-use lab::report::{self, Findings, ROBUSTNESS_RUNS, record};
+use lab::report::{self, Findings, ROBUSTNESS_RUNS};
 use lab::simulation::monitor::Summary;
 use lab::simulation::monte_carlo::{RUNS_MAX, Statistics};
 use lab::simulation::scenario::Scenario;
@@ -43,6 +44,8 @@ pub(super) struct ReportArgs {
     /// Recorded frequency to replay and to answer what chargers would have changed
     #[arg(long, value_name = "TRACE.csv")]
     trace: Option<PathBuf>,
+    #[command(flatten)]
+    record: RecordOptions,
     /// Show a fleet of so many instances of the firmware
     #[arg(long, value_name = "N")]
     fleet: Option<usize>,
@@ -80,8 +83,8 @@ pub(super) fn run(args: &ReportArgs) -> Result<(), Failure> {
         )));
     }
     let spec = args.spec.load()?;
-    let trace = match &args.trace {
-        Some(path) => Some(trace::read(path, None).map_err(Failure::bad)?),
+    let record = match &args.trace {
+        Some(path) => Some(args.record.read(path)?),
         None => None,
     };
     let mut specs = vec![(spec.clone(), args.table.as_deref())];
@@ -103,8 +106,8 @@ pub(super) fn run(args: &ReportArgs) -> Result<(), Failure> {
         if let Some(instances) = args.fleet {
             more.push(fleet_section(study, instances)?);
         }
-        if let Some(trace) = &trace {
-            more.extend(recorded(study, trace)?);
+        if let Some(record) = &record {
+            more.extend(recorded(study, record)?);
         }
     }
     let rendered = report::render_studies(&studies, &findings, more).map_err(Failure::bad)?;
@@ -157,18 +160,18 @@ fn fleet_section(study: &Study, instances: usize) -> Result<Section, Failure> {
 }
 
 /// The sections of a recorded event.
-fn recorded(study: &Study, trace: &Trace) -> Result<Vec<Section>, Failure> {
+fn recorded(study: &Study, record: &Record) -> Result<Vec<Section>, Failure> {
     let parsed = TableView::parse(&study.table);
     let table = parsed.map_err(|error| Failure::BadInput(format!("{error:?}")))?;
-    let replay = replay::replay(&table, trace)
-        .map_err(|error| Failure::BadInput(format!("the observer cannot be made: {error:?}")))?;
+    let replay = replay::replay(&table, record)
+        .map_err(|error| Failure::BadInput(format!("the charger rejects the table: {error:?}")))?;
     let question = Question::PAPER;
-    let found = counterfactual::answer(&study.spec, &table, trace, &question);
+    let found = counterfactual::answer(&study.spec, &table, record, &question);
     let found = found.map_err(Failure::bad)?;
     let name = study.spec.name.as_str();
     Ok(vec![
-        record::replay(name, trace, &replay),
-        record::counterfactual(name, &found),
+        report::record::replay(name, record, &replay),
+        report::record::counterfactual(name, &found),
     ])
 }
 

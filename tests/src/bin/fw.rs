@@ -10,7 +10,7 @@ use clap::{Parser, Subcommand};
 use firmware::link::session::{Session, Wires};
 use firmware::link::{Request, Setup, SourceKind};
 use firmware::table::TableView;
-use lab::replay::trace;
+use lab::record::{self, ReadOptions};
 use model::spec::Spec;
 use synth::game::Unwatched;
 use synth::pipeline;
@@ -256,7 +256,7 @@ fn replay(pair: &mut Pair<'_, '_>) -> Result<(), AnyError> {
         println!("SKIPPED: the replay of 9 August 2019, for {RECORDED} is not there");
         return Ok(());
     }
-    let trace = trace::read(&path, None)?;
+    let trace = record::read(&path, &ReadOptions::default())?;
     let deviations: Vec<f64> = trace
         .samples
         .iter()

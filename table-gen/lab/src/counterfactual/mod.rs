@@ -16,7 +16,7 @@ use rand_pcg::Pcg64;
 use rayon::prelude::*;
 use serde::Serialize;
 
-use crate::replay::trace::Trace;
+use crate::record::Record;
 use crate::simulation::NOMINAL_HZ;
 use crate::simulation::beyond::Governor;
 use crate::simulation::closed_loop::LoopError;
@@ -50,7 +50,15 @@ pub const LIMITS: [&str; 6] = [
 /// Why there is no answer.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum CounterfactualError {
-    /// The trace's samples do not fall on the firmware's ticks.
+    /// The levels of the relays are those of a system of 50 Hz.
+    #[error(
+        "a system of {found_hz} Hz; allowed: 50 Hz, for the relays' levels are Great Britain's"
+    )]
+    Nominal {
+        /// Frequency of the record's system at rest \[Hz\].
+        found_hz: f64,
+    },
+    /// The record's samples do not fall on the firmware's ticks.
     #[error("samples are {step_s} s apart; allowed: a whole number of ticks of {tick_s} s")]
     Step {
         /// Time between samples \[s\].
@@ -172,16 +180,21 @@ pub struct Counterfactual {
 pub fn answer(
     spec: &Spec,
     table: &TableView<'_>,
-    trace: &Trace,
+    record: &Record,
     question: &Question,
 ) -> Result<Counterfactual, CounterfactualError> {
-    let step_s = trace.samples[1].time_s - trace.samples[0].time_s;
+    if record.nominal_hz != NOMINAL_HZ {
+        return Err(CounterfactualError::Nominal {
+            found_hz: record.nominal_hz,
+        });
+    }
+    let step_s = record.step_s;
     let tick_s = f64::from(table.header().tick_ms) / 1000.0;
     let ticks = step_s / tick_s;
     if (ticks - ticks.round()).abs() > 1e-6 || ticks < 0.5 {
         return Err(CounterfactualError::Step { step_s, tick_s });
     }
-    let recorded: Vec<(f64, f64)> = trace
+    let recorded: Vec<(f64, f64)> = record
         .samples
         .iter()
         .map(|sample| (sample.time_s, sample.frequency_hz))

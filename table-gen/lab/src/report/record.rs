@@ -4,8 +4,8 @@ use super::figure::{Curve, Figure, Stretch, thin};
 use super::palette::Colour;
 use super::section::{DataTable, Section};
 use crate::counterfactual::{Counterfactual, LIMITS, PlantAnswer};
-use crate::replay::Replay;
-use crate::replay::trace::Trace;
+use crate::record::Record;
+use crate::replay::{REACTION_STEP_MAX_S, Replay};
 
 /// Time from one drawn point to the next \[s\].
 const POINT_S: f64 = 0.5;
@@ -25,12 +25,8 @@ fn extent(curves: &[Curve]) -> (f64, f64) {
     (low - 0.05, high + 0.05)
 }
 
-fn end_s(trace: &Trace) -> f64 {
-    trace.samples.last().map_or(1.0, |sample| sample.time_s)
-}
-
 /// The firmware on the record.
-pub fn replay(spec: &str, trace: &Trace, replay: &Replay) -> Section {
+pub fn replay(spec: &str, record: &Record, replay: &Replay) -> Section {
     let stretches: Vec<Stretch> = replay
         .phases
         .iter()
@@ -49,17 +45,21 @@ pub fn replay(spec: &str, trace: &Trace, replay: &Replay) -> Section {
         (Some(onset), None) => {
             format!("The event begins at {onset:.1} s; the chargers do not respond.")
         }
+        (None, _) if record.step_s > REACTION_STEP_MAX_S => format!(
+            "Samples are {} s apart: too far to say when an event began.",
+            record.step_s
+        ),
         (None, _) => "There is no event in the record.".to_owned(),
     };
-    let quiet_s = replay.onset_s.unwrap_or_else(|| end_s(trace));
+    let quiet_s = replay.onset_s.unwrap_or_else(|| record.end_s());
     let mut section = Section::new(format!("The recorded event: {spec}")).say(format!(
         "Record from {}, {} samples. {reaction} In the {quiet_s:.0} s without an event the chargers responded {} times. The grid \
          of a record does not feel the chargers.",
-        trace.start,
-        trace.samples.len(),
+        record.start,
+        record.samples.len(),
         replay.false_triggers
     ));
-    let recorded = trace.samples.iter().map(|s| (s.time_s, s.frequency_hz));
+    let recorded = record.samples.iter().map(|s| (s.time_s, s.frequency_hz));
     let frequency = vec![curve("recorded".to_owned(), Colour::Without, recorded)];
     let participation = replay
         .samples
@@ -70,7 +70,7 @@ pub fn replay(spec: &str, trace: &Trace, replay: &Replay) -> Section {
         Colour::Symbolic,
         participation,
     )];
-    let time_s = (0.0, end_s(trace));
+    let time_s = (0.0, record.end_s());
     section.figures.push(Figure {
         id: "replay-frequency".to_owned(),
         title: format!("Recorded frequency and the phases of {spec}"),
