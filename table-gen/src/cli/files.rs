@@ -39,6 +39,16 @@ pub(super) fn write_all(dir: &Path, files: &[(&str, &[u8])]) -> Result<(), Failu
     Ok(())
 }
 
+/// Writes one file, or nothing: it is made beside its place and moved when it is complete.
+pub(super) fn write_one(path: &Path, bytes: &[u8]) -> Result<(), Failure> {
+    let fail = |error: std::io::Error| Failure::BadInput(format!("{}: {error}", path.display()));
+    let dir = path.parent().filter(|dir| !dir.as_os_str().is_empty());
+    let staged = tempfile::NamedTempFile::new_in(dir.unwrap_or(Path::new("."))).map_err(fail)?;
+    std::fs::write(staged.path(), bytes).map_err(fail)?;
+    staged.persist(path).map_err(|error| fail(error.error))?;
+    Ok(())
+}
+
 fn interruption() -> Failure {
     Failure::No("interrupted; nothing was written".to_owned())
 }

@@ -14,6 +14,7 @@ mod inspect;
 mod keys;
 mod monitor;
 mod monte_carlo;
+mod ocpp;
 mod output;
 mod plot;
 mod progress;
@@ -63,6 +64,8 @@ enum Command {
     Formula(formula::FormulaArgs),
     /// Show a charger's telemetry, live from a serial port or from a recording
     Monitor(monitor::MonitorArgs),
+    /// The fallback droop and the event's end as messages of OCPP 2.1, and back
+    Ocpp(ocpp::OcppArgs),
     /// Bytes by part, visits of a lookup, free flash on a list of microcontrollers
     Budget(budget::BudgetArgs),
     /// What is in a table: header, levels, jumps between neighbours, slices
@@ -182,6 +185,7 @@ pub(crate) fn run() -> ExitCode {
         Command::Falsify(args) => falsify::run(&args),
         Command::Formula(args) => formula::run(&args),
         Command::Monitor(args) => monitor::run(&args),
+        Command::Ocpp(args) => ocpp::run(&args),
         Command::Budget(args) => budget::run(&args),
         Command::Inspect(args) => inspect::run(&args),
         Command::Keys(args) => keys::run(&args),
