@@ -11,6 +11,15 @@ use std::{env, fs, io};
 /// root.
 const TABLE_DEFAULT: &str = "firmware/tables/paper-bi.bin";
 
+/// Boards and their memory maps, from the package's folder.
+const BOARDS: &str = "images/boards";
+/// The map of the board that is built, in the build's own folder.
+const MAP: &str = "board.x";
+/// Map of the reference board, which is built unless a feature has the name of another map.
+const REFERENCE_MAP: &str = "stm32f405.x";
+/// Map of the emulated RISC-V board.
+const RISCV_MAP: &str = "riscv-virt.x";
+
 fn main() -> io::Result<()> {
     println!("cargo::rerun-if-changed=build.rs");
     println!("cargo::rerun-if-env-changed=HOLDFAST_TABLE");
@@ -18,31 +27,51 @@ fn main() -> io::Result<()> {
     if !is("CARGO_CFG_TARGET_OS", "none") {
         return Ok(());
     }
-    // The reference board's map, and that of the emulated RISC-V board. The linker looks into the
-    // folder it is started in first, which may hold the other, so the names differ.
-    let (map, name) = if is("CARGO_CFG_TARGET_ARCH", "arm") {
-        ("memory.x", "memory.x")
-    } else {
-        ("firmware/images/memory/riscv-virt.x", "riscv-virt.x")
-    };
     let folder = |name: &str| env::var_os(name).map(PathBuf::from).unwrap_or_default();
-    let root = folder("CARGO_MANIFEST_DIR").join("..");
+    let package = folder("CARGO_MANIFEST_DIR");
+    let root = package.join("..");
     let out = folder("OUT_DIR");
-    let memory = root.join(map);
-    println!("cargo::rerun-if-changed={}", memory.display());
-    fs::copy(&memory, out.join(name))?;
+    let arm = is("CARGO_CFG_TARGET_ARCH", "arm");
+    let map = package.join(BOARDS).join(if arm {
+        board(&package)?
+    } else {
+        RISCV_MAP.to_owned()
+    });
+    println!("cargo::rerun-if-changed={}", map.display());
+    // The linker looks into the folder it is started in first, so no map may lie there by this name.
+    fs::copy(&map, out.join(MAP))?;
     println!("cargo::rustc-link-search={}", out.display());
+    if arm {
+        let memory = root.join("memory.x");
+        println!("cargo::rerun-if-changed={}", memory.display());
+        fs::copy(&memory, out.join("memory.x"))?;
+    }
     // Sections must not be padded to pages; the runtime's script comes from cortex-m-rt or
     // riscv-rt, and the latter leaves it to us to include the map.
     println!("cargo::rustc-link-arg-bins=--nmagic");
-    if name != "memory.x" {
-        println!("cargo::rustc-link-arg-bins=-T{name}");
+    if !arm {
+        println!("cargo::rustc-link-arg-bins=-T{MAP}");
     }
     println!("cargo::rustc-link-arg-bins=-Tlink.x");
     if env::var_os("CARGO_FEATURE_LOG").is_some() {
         println!("cargo::rustc-link-arg-bins=-Tdefmt.x");
     }
     table(&root, &out)
+}
+
+/// The map of the board that is built: that with the name of an enabled feature, or the reference
+/// board's.
+fn board(package: &Path) -> io::Result<String> {
+    for entry in fs::read_dir(package.join(BOARDS))? {
+        let name = entry?.file_name().to_string_lossy().into_owned();
+        if let Some(feature) = name.strip_suffix(".x") {
+            let variable = feature.to_uppercase().replace('-', "_");
+            if env::var_os(format!("CARGO_FEATURE_{variable}")).is_some() {
+                return Ok(name);
+            }
+        }
+    }
+    Ok(REFERENCE_MAP.to_owned())
 }
 
 /// Copies the table to where the image includes it. Without a table the section stays empty: the

@@ -18,8 +18,8 @@ use semihosting::fs::File;
 use semihosting::io::{Read as _, Write as _};
 use semihosting::process;
 
-#[cfg_attr(target_arch = "arm", path = "machine/arm.rs")]
-#[cfg_attr(target_arch = "riscv32", path = "machine/riscv.rs")]
+#[cfg_attr(target_arch = "arm", path = "boards/pil-arm.rs")]
+#[cfg_attr(target_arch = "riscv32", path = "boards/pil-riscv.rs")]
 mod machine;
 #[path = "table_region.rs"]
 mod table_region;

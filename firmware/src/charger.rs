@@ -188,6 +188,11 @@ impl<'t, S: FrequencySource, D: Dispatch, W: Watchdog> Charger<'t, S, D, W> {
         &mut self.dispatch
     }
 
+    /// Between the ticks: lets the source take what was captured.
+    pub fn poll(&mut self, now_ms: u32) {
+        self.source.poll(now_ms);
+    }
+
     /// One tick.
     pub fn tick(&mut self, now_ms: u32) -> Report {
         let mut faults = Faults::NONE;

@@ -94,13 +94,16 @@ impl From<FrequencyError> for Faults {
 ///
 /// | mode | entered by | participation | left |
 /// |---|---|---|---|
-/// | `WarmUp` | start, restart, clock jump, frequency back after `Safe` | baseline droop on f | when the observer is trusted |
+/// | `WarmUp` | start, clock jump, end of `Safe` | droop on f | when the observer is trusted |
 /// | `Table` | a law covers the state | the table's | |
-/// | `DroopOutside` | no law covers the state | baseline droop on f | when a law covers it |
-/// | `DroopNoTable` | the table was rejected | baseline droop on f, dead band and slope of the paper | restart |
+/// | `DroopOutside` | no law covers the state | droop on f | when a law covers it |
+/// | `DroopNoTable` | the table was rejected | droop on f, the paper's | restart |
 /// | `Hold` | no believed frequency | the last, held | frequency back, or `hold_ticks` |
-/// | `Safe` | frequency lost for longer | released step by step: ordinary charging | frequency back, then `WarmUp` |
-/// | `Release` | the event is over ([`crate::event`]) | released step by step, standing still while f is low | at zero; f below I1 |
+/// | `Safe` | frequency lost for longer | released step by step | frequency back |
+/// | `Release` | the end of an event | released while f is recovered | at zero; f below I1 |
+///
+/// Released step by step means: back to ordinary charging. [`crate::event`] says when an event
+/// ends.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[repr(u8)]

@@ -4,18 +4,19 @@
 //!
 //! | module | turns | into |
 //! |---|---|---|
-//! | [`units`] | the quantities of the grid model | integers in micro-units, the same on host and target |
-//! | [`frequency`] | bytes on a bus or timer ticks | a mains frequency that is believed, or a reason why not |
+//! | [`units`] | quantities of the grid model | integers in micro-units, as on the host |
+//! | [`frequency`] | bytes on a bus or timer ticks | a frequency, or a reason why there is none |
 //! | [`observer`] | measured frequency | the grid state (f, g, l, p) |
 //! | [`grid`] | a state | a cell, by the only quantiser there is |
 //! | [`table`] | a cell | an input level, or "outside" |
-//! | [`prediction`] | a state and the commands under way | the state in which a command begins to act |
+//! | [`prediction`] | state and commands under way | the state in which a command begins to act |
 //! | [`phase`] | state and table | the law in force: No control, C1, C2, Fixed, Hold |
 //! | [`droop`] | a frequency | the baseline participation, used as the fallback |
 //! | [`control_loop`] | one state a tick | one [`control_loop::Action`] a tick |
 //! | [`event`] | f over minutes | the end of an event, and the way back to ordinary charging |
 //! | [`dispatch`] | a participation | this charger's current or power |
-//! | [`charger`] | one reading a tick | all of the above, with a defined [`fault`] state for whatever is missing |
+//! | [`charger`] | one reading a tick | the above, and a [`fault`] state for what is missing |
+//! | [`board`] | a board's time and lines | the loop that ticks the charger |
 //! | [`telemetry`] | a tick's report | a frame on a serial line |
 //! | [`flash`] | a flash region | the table's bytes |
 //! | [`link`] | requests of a host | the answers of a charger: processor in the loop |
@@ -54,6 +55,8 @@ pub mod dispatch;
 pub mod fault;
 
 pub mod charger;
+
+pub mod board;
 
 pub mod telemetry;
 

@@ -8,7 +8,7 @@
 //! | C1 | f outside I1 | every period, counted from the switch |
 //! | C2 | f in I1, outside I2 | every period, counted from the switch |
 //! | Fixed | f in I2; the last participation is held | every tick |
-//! | Hold | with `stay`: the state is in the safety law's domain | every period, counted from the switch |
+//! | Hold | with `stay`: the safety law covers the state | every period, counted from the switch |
 //!
 //! A *decision* tries the laws in the order Hold, Fixed, C2, C1 and takes the first that applies
 //! and has an entry for the cell. With none, the answer is [`Step::Outside`] and the next tick

@@ -5,13 +5,14 @@
 //! | `sizes.txt` | flash and static RAM by section, panics, allocation, float formatting | the ELF files |
 //! | `run.txt` | stack, instructions of a lookup and of a tick | QEMU: painted stack, system timer under `-icount` |
 //!
-//! A figure past its goal fails, but for the misses that the file already states: those are told at every run. The text
-//! itself must be equal as well, as long as compiler and table are those
-//! that the file names; with others a difference is only shown.
+//! A figure past its goal fails, but for the misses that the file already states: those are told at
+//! every run. The text itself must be equal as well, as long as compiler and table are those that
+//! the file names; with others a difference is only shown.
 
 use std::fmt::Write as _;
 use std::fs;
 use std::io::{self, Write as _};
+use std::ops::Range;
 use std::path::Path;
 use std::process::{Command, Stdio};
 use std::time::Duration;
@@ -35,8 +36,6 @@ const RAM_MAX: u32 = 4 * 1024;
 const LOOKUP_MAX: u32 = 350;
 /// Goal for a tick \[instructions\].
 const TICK_MAX: u32 = 5_000;
-/// Start and length of the board's RAM, from memory.x.
-const RAM: (u32, usize) = (0x2000_0000, 128 * 1024);
 /// What the runtime paints unused stack with.
 const PAINT: [u8; 4] = [0xCC; 4];
 /// How long the charger without a HAL runs before its stack is read: many rounds of what it plays.
@@ -110,15 +109,16 @@ impl Figures {
     /// Compares with the committed file, or replaces it.
     ///
     /// # Errors
-    /// A goal is missed that the file does not show as missed, or a figure differs although compiler and table are the
-    /// file's.
+    /// A goal is missed that the file does not show as missed, or a figure differs although
+    /// compiler and table are the file's.
     pub fn check(&self, file: &str, bless: bool) -> Result<(), CostError> {
         let path = root().join("firmware/expected").join(file);
         if bless {
             fs::write(&path, &self.text).map_err(io_error(path.display().to_string()))?;
         }
         let committed = fs::read_to_string(&path).map_err(io_error(path.display().to_string()))?;
-        // A goal that the committed figures miss already is told every time; a new miss fails, whatever the table.
+        // A goal that the committed figures miss already is told every time; a new miss fails,
+        // whatever the table.
         let known = |line: &&String| committed.lines().any(|old| old == line.as_str());
         for line in self.missed.iter().filter(known) {
             println!("    {file}: known miss: {line}");
@@ -242,7 +242,8 @@ pub fn sizes() -> Result<Figures, CostError> {
 pub fn run(table: &[u8]) -> Result<Figures, CostError> {
     let mut figures = Figures::default();
     figures.note(&compiler());
-    // The CRC that the table carries: that of bytes with their own CRC behind them is the same for every table.
+    // The CRC that the table carries: that of bytes with their own CRC behind them is the same for
+    // every table.
     let crc = table
         .last_chunk::<4>()
         .map_or(0, |crc| u32::from_le_bytes(*crc));
@@ -320,20 +321,20 @@ fn painted_stack(elf: &Elf, table: &[u8]) -> Result<u32, CostError> {
     );
     elf.save(&image)?;
     fs::write(&table_file, table).map_err(io_error("table.bin"))?;
-    let dump = folder.path().join("ram.bin");
-    emulate(&image, &table_file, &dump)?;
-    let ram = fs::read(&dump).map_err(io_error("dump of the emulator's RAM"))?;
-    let at = |address: u32| (address - RAM.0) as usize;
-    let stack = ram.get(at(bottom)..at(top)).unwrap_or_default();
+    let dump = folder.path().join("stack.bin");
+    let loader = format!(
+        "loader,file={},addr={:#x},force-raw=on",
+        table_file.display(),
+        elf.table_start()?
+    );
+    emulate(&image, &loader, &dump, bottom..top)?;
+    let stack = fs::read(&dump).map_err(io_error("dump of the emulator's stack"))?;
     let untouched = stack.chunks_exact(4).take_while(|word| **word == PAINT);
     Ok((stack.len() - 4 * untouched.count()) as u32)
 }
 
-fn emulate(image: &Path, table: &Path, dump: &Path) -> Result<(), CostError> {
-    let loader = format!(
-        "loader,file={},addr=0x080E0000,force-raw=on",
-        table.display()
-    );
+/// Runs an image with a table for a while, then dumps a stretch of memory.
+fn emulate(image: &Path, loader: &str, dump: &Path, memory: Range<u32>) -> Result<(), CostError> {
     let mut qemu = Command::new("qemu-system-arm")
         .args([
             "-machine",
@@ -343,7 +344,7 @@ fn emulate(image: &Path, table: &Path, dump: &Path) -> Result<(), CostError> {
             "-serial",
             "none",
         ])
-        .args(["-monitor", "stdio", "-device", &loader, "-kernel"])
+        .args(["-monitor", "stdio", "-device", loader, "-kernel"])
         .arg(image)
         .stdin(Stdio::piped())
         .stdout(Stdio::null())
@@ -353,8 +354,8 @@ fn emulate(image: &Path, table: &Path, dump: &Path) -> Result<(), CostError> {
     if let Some(monitor) = &mut qemu.stdin {
         let commands = format!(
             "pmemsave {} {} \"{}\"\nquit\n",
-            RAM.0,
-            RAM.1,
+            memory.start,
+            memory.len(),
             dump.display()
         );
         monitor
@@ -380,10 +381,8 @@ fn worst_lookup(target: &mut Target, table: &[u8]) -> Result<u32, CostError> {
         let stride = 100_003;
         let mut dearest: Vec<_> = (0..cells.min(400_000))
             .filter_map(|n| {
-                let cell = crate::stand_in::cell_of(
-                    &grid,
-                    (u64::from(n) * stride % u64::from(cells)) as u32,
-                );
+                let index = u64::from(n) * stride % u64::from(cells);
+                let cell = grid.cell(index as u32)?;
                 let low = grid.bounds(cell)?.map(|(low, _)| low);
                 Some((reader.visits(cell), low))
             })

@@ -13,10 +13,8 @@ use crate::root;
 
 /// Target of the images: the reference board's Cortex-M4F.
 pub const TARGET: &str = "thumbv7em-none-eabihf";
-/// Start of the FLASH region, from memory.x.
-const FLASH: u32 = 0x0800_0000;
-/// Start of the TABLE region, from memory.x.
-const TABLE: u32 = 0x080E_0000;
+/// Symbol of the TABLE region's first byte, from the memory map.
+const TABLE_START: &str = "__table_start";
 /// Bytes of a record of Intel HEX.
 const HEX_RECORD: usize = 16;
 
@@ -87,6 +85,9 @@ pub enum ImageError {
         /// Why.
         source: object::Error,
     },
+    /// A symbol of the memory map is missing.
+    #[error("the image has no symbol {0}")]
+    Symbol(&'static str),
     /// A record of Intel HEX cannot be written.
     #[error("Intel HEX: {0}")]
     Hex(String),
@@ -231,6 +232,15 @@ impl Elf {
         Ok(found.map(|symbol| symbol.address() as u32))
     }
 
+    /// Start of the TABLE region, as the memory map of the image's board has it.
+    ///
+    /// # Errors
+    /// Not an ELF file, or one without a TABLE region.
+    pub fn table_start(&self) -> Result<u32, ImageError> {
+        let missing = || ImageError::Symbol(TABLE_START);
+        self.symbol(TABLE_START)?.ok_or_else(missing)
+    }
+
     /// What is written to flash: load address and bytes of each segment, in order.
     ///
     /// # Errors
@@ -303,20 +313,23 @@ fn hex(segments: &[(u32, Vec<u8>)]) -> Result<String, ImageError> {
         .map_err(|error| ImageError::Hex(error.to_string()))
 }
 
-/// Writes ELF, BIN (code and, if there is one, table apart) and HEX (both) to a folder; the files' names.
+/// Writes ELF, BIN (code and, if there is one, table apart) and HEX (both) to a folder; the files'
+/// names.
 ///
 /// # Errors
 /// A file cannot be written.
 pub fn write(image: Image, elf: &Elf, folder: &Path) -> Result<Vec<PathBuf>, ImageError> {
     fs::create_dir_all(folder).map_err(io_error(folder.display().to_string()))?;
     let segments = elf.segments()?;
+    let flash = segments.first().map_or(0, |(address, _)| *address);
+    let table_start = elf.table_start()?;
     let name = image.name;
     let mut files = vec![
         (format!("{name}.elf"), elf.bytes.clone()),
-        (format!("{name}.bin"), flat(&segments, FLASH, TABLE)),
+        (format!("{name}.bin"), flat(&segments, flash, table_start)),
         (format!("{name}.hex"), hex(&segments)?.into_bytes()),
     ];
-    let table = flat(&segments, TABLE, u32::MAX);
+    let table = flat(&segments, table_start, u32::MAX);
     if !table.is_empty() {
         files.push((format!("{name}-table.bin"), table));
     }
@@ -348,6 +361,8 @@ mod tests {
 
     #[test]
     fn a_flat_image_fills_gaps_as_erased_flash() {
+        const FLASH: u32 = 0x0800_0000;
+        const TABLE: u32 = 0x080E_0000;
         let segments = [(FLASH, vec![1, 2]), (FLASH + 4, vec![3]), (TABLE, vec![4])];
         assert_eq!(flat(&segments, FLASH, TABLE), [1, 2, 0xFF, 0xFF, 3]);
         assert_eq!(flat(&segments, TABLE, u32::MAX), [4]);

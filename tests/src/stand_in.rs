@@ -1,13 +1,14 @@
-//! A small table made by hand: the paper's plant on a coarse grid, with plausible laws that nobody proved.
+//! A small table made by hand: the paper's plant on a coarse grid, with plausible laws that nobody
+//! proved.
 //!
-//! It exercises reader, phase machine and drivers where a synthesised table would only cost time. Its laws have holes, so
-//! that a run also meets states outside the domain.
+//! It exercises reader, phase machine and drivers where a synthesised table would only cost time.
+//! Its laws have holes, so that a run also meets states outside the domain.
 
 use firmware::droop::Droop;
 use firmware::grid::{Cell, Grid, GridError};
 use firmware::table::{
     CRC_LEN, HEADER_LEN, Header, InputsKind, LAWS, LawEntry, PlantParameters, WriteError,
-    bits_per_entry, seal, write_header,
+    bits_per_entry, field, seal, write_header,
 };
 use firmware::units::{Band, STATES};
 use synth::delay::Delay;
@@ -16,9 +17,6 @@ use synth::delay::Delay;
 const LEVELS: u8 = 21;
 /// Cells of the grid: f in 0.05 Hz, g, l, p in 0.5 GW.
 const COUNT: [u16; STATES] = [24, 8, 6, 6];
-
-/// Offset of the delay in the header.
-const DELAY_AT: usize = 78;
 
 /// Why no table was made.
 #[derive(Debug)]
@@ -59,7 +57,8 @@ fn header(stay: bool) -> Result<Header, GridError> {
     })
 }
 
-/// Level plus one of a law at a cell, 0 for none: more for a lower frequency, less for more turbine power.
+/// Level plus one of a law at a cell, 0 for none: more for a lower frequency, less for more turbine
+/// power.
 fn entry(law: usize, cell: [u16; STATES]) -> u8 {
     let [f, g, l, p] = cell.map(i32::from);
     let hole = (f * 7 + g * 5 + l * 3 + p + law as i32).rem_euclid(29) == 0;
@@ -81,7 +80,8 @@ fn block(grid: &Grid, law: usize) -> Vec<u8> {
     let at = block.len();
     block.resize(at + (cells * bits).div_ceil(8), 0);
     for index in 0..cells {
-        let Cell(cell) = cell_of(grid, index as u32);
+        // Every index is one of the grid's.
+        let Cell(cell) = grid.cell(index as u32).unwrap_or_default();
         let value = u16::from(entry(law, cell)) << (index * bits % 8);
         for (offset, byte) in value.to_le_bytes().into_iter().enumerate() {
             if byte != 0 {
@@ -90,17 +90,6 @@ fn block(grid: &Grid, law: usize) -> Vec<u8> {
         }
     }
     block
-}
-
-/// The cell at a position of a grid's dense order, f fastest.
-pub fn cell_of(grid: &Grid, index: u32) -> Cell {
-    let mut rest = index;
-    let mut cell = [0; STATES];
-    for (axis, count) in cell.iter_mut().zip(grid.count()) {
-        *axis = (rest % u32::from(count)) as u16;
-        rest /= u32::from(count);
-    }
-    Cell(cell)
 }
 
 /// The table's bytes. With `stay` it has the Hold law instead of Fixed.
@@ -128,13 +117,14 @@ pub fn table(stay: bool) -> Result<Vec<u8>, StandInError> {
     Ok(image)
 }
 
-/// The same laws in a table whose commands act late, with the prediction of this delay. Nobody proved what it does.
+/// The same laws in a table whose commands act late, with the prediction of this delay. Nobody
+/// proved what it does.
 ///
 /// # Errors
 /// None for a table that the reader accepts and has no delay yet.
 pub fn late(table: &[u8], delay: &Delay) -> Result<Vec<u8>, WriteError> {
     let mut image = table.to_vec();
-    image[DELAY_AT..DELAY_AT + 2].copy_from_slice(&(delay.ticks as u16).to_le_bytes());
+    image[field::DELAY].copy_from_slice(&(delay.ticks as u16).to_le_bytes());
     image.splice(HEADER_LEN..HEADER_LEN, delay.coefficients.bytes());
     seal(&mut image)?;
     Ok(image)

@@ -38,7 +38,8 @@ impl TickClock {
         // The nearest whole number of ticks; a tick may come up to half a tick early or late.
         let elapsed = now_ms.wrapping_sub(last_ms).wrapping_add(tick / 2);
         if elapsed >= u32::MAX / 2 {
-            // Before the half tick of tolerance: a little early is nothing, more is a clock that went back.
+            // Before the half tick of tolerance: a little early is nothing, more is a clock that
+            // went back.
             let early = last_ms.wrapping_sub(now_ms);
             if early <= tick {
                 return Due::Ticks(0);

@@ -24,6 +24,7 @@ use embedded_hal::i2c::I2c;
 use embedded_hal::spi::{Operation, SpiDevice};
 
 use super::{FrequencyError, FrequencySource, NOMINAL_HZ, Reading};
+use crate::board::Hardware;
 use crate::units::MICRO;
 use crate::wide::divide;
 
@@ -154,6 +155,11 @@ pub const fn deviation_uhz(period: u16) -> Result<i32, FrequencyError> {
     } else {
         deviation as i32
     })
+}
+
+/// The chip on a board's SPI; `None` if the board has none.
+pub fn on<H: Hardware>(hardware: &mut H) -> Option<Ade7953<Spi<H::Spi>>> {
+    Some(Ade7953::new(Spi(hardware.spi()?)))
 }
 
 /// The chip as a frequency source.

@@ -9,6 +9,13 @@ pub mod filter;
 pub mod gate;
 pub mod zero_crossing;
 
+/// The meter of this build's product, by cargo feature: the captures of zero crossings unless a
+/// feature names a chip.
+#[cfg(feature = "ade7953")]
+pub use ade7953 as meter;
+#[cfg(not(feature = "ade7953"))]
+pub use zero_crossing as meter;
+
 use core::num::NonZeroU16;
 
 /// Nominal frequency \[Hz\].
@@ -72,6 +79,12 @@ pub trait FrequencySource {
     /// Ticks of unchanged readings after which the source is stuck; `None` for sources that may
     /// repeat themselves.
     fn stuck_after(&self) -> Option<NonZeroU16>;
+
+    /// Between the ticks: takes what the hardware has captured, if anything. Sources that are read
+    /// when a tick asks have nothing to do here.
+    fn poll(&mut self, now_ms: u32) {
+        let _ = now_ms;
+    }
 
     /// The latest reading. `now_ms` is the caller's monotonic clock, which may wrap.
     ///

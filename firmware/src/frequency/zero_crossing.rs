@@ -14,11 +14,14 @@
 use core::num::NonZeroU16;
 
 use super::{FrequencyError, FrequencySource, NOMINAL_HZ, Reading};
+use crate::board::Hardware;
 use crate::units::MICRO;
 use crate::wide::divide;
 
 /// Most cycles of a window.
 pub const CYCLES_MAX: usize = 16;
+/// Cycles of the product's window: 100 ms, one tick.
+pub const CYCLES_DEFAULT: u8 = 5;
 /// Fastest timer \[Hz\]: a window of [`CYCLES_MAX`] cycles must not wrap 32 bits.
 pub const TIMER_HZ_MAX: u32 = 200_000_000;
 /// Slowest timer \[Hz\]: below, one timer tick is worth more than 50 mHz over one cycle.
@@ -28,6 +31,64 @@ pub const TIMER_HZ_MIN: u32 = 50_000;
 const STUCK_TICKS: u16 = 100;
 
 const _: () = assert!(CYCLES_MAX as u64 * TIMER_HZ_MAX as u64 / 45 < u32::MAX as u64);
+
+/// Hardware that keeps the timer's count at a zero crossing until it is read.
+pub trait Captures {
+    /// Rate of the timer \[Hz\].
+    const TIMER_HZ: u32;
+    /// Tolerance of the timer's clock \[ppm\].
+    const CLOCK_PPM: u16;
+
+    /// The count at the last crossing, if there was one since the last call.
+    fn take(&mut self) -> Option<u32>;
+}
+
+/// A window fed by capture hardware.
+#[derive(Debug)]
+pub struct Captured<C> {
+    captures: C,
+    window: ZeroCrossing,
+}
+
+impl<C: Captures> Captured<C> {
+    /// A window of [`CYCLES_DEFAULT`] cycles on this hardware.
+    ///
+    /// # Errors
+    /// The hardware's timer is too slow or too fast.
+    pub fn new(captures: C) -> Result<Self, ZeroCrossingError> {
+        let window = ZeroCrossing::new(C::TIMER_HZ, CYCLES_DEFAULT, C::CLOCK_PPM)?;
+        Ok(Self { captures, window })
+    }
+}
+
+/// The source on a board's captures; `None` if the board has none that serve.
+pub fn on<H: Hardware>(hardware: &mut H) -> Option<Captured<H::Captures>> {
+    Captured::new(hardware.captures()?).ok()
+}
+
+impl<C: Captures> FrequencySource for Captured<C> {
+    fn error_uhz(&self) -> u32 {
+        self.window.error_uhz()
+    }
+
+    fn lag_ms(&self) -> u16 {
+        self.window.lag_ms()
+    }
+
+    fn stuck_after(&self) -> Option<NonZeroU16> {
+        self.window.stuck_after()
+    }
+
+    fn poll(&mut self, now_ms: u32) {
+        if let Some(stamp) = self.captures.take() {
+            self.window.capture(stamp, now_ms);
+        }
+    }
+
+    fn read(&mut self, now_ms: u32) -> Result<Reading, FrequencyError> {
+        self.window.read(now_ms)
+    }
+}
 
 /// Why a capture cannot be set up.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

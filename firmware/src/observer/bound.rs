@@ -136,7 +136,8 @@ mod tests {
 
     #[test]
     fn between_samples_of_the_papers_event() {
-        // |l - p| < 1 GW, imbalance 2 GW: (1/0.5 + 1 * 2/8)/8 = 0.28 Hz/s², 0.35 mHz over a tick of 0.1 s;
+        // |l - p| < 1 GW, imbalance 2 GW: (1/0.5 + 1 * 2/8)/8 = 0.28 Hz/s²,
+        // 0.35 mHz over a tick of 0.1 s;
         // the loss of 2 GW inside a tick: 0.25 Hz/s * 0.1 s / 4 = 6.25 mHz.
         let curvature =
             InputError::curvature_uhz_per_s2(&PlantParameters::PAPER, 1_000_000, 2_000_000);

@@ -4,9 +4,10 @@
 //! |---:|---:|---|
 //! | 0 | 4 × 2 | first cell of the box, f g l p |
 //! | 8 | 4 × 2 | cells of the box, f g l p |
-//! | 16 | | entries, f fastest, [`bits_per_entry`] bits each, lowest bit first; the last byte is padded with zeros |
+//! | 16 | | entries, f fastest, [`bits_per_entry`] bits each, lowest bit first |
 //!
-//! An entry is 0 outside the law's domain, else the level plus one.
+//! The last byte is padded with zeros. An entry is 0 outside the law's domain, else the level plus
+//! one.
 
 use super::BlockError;
 use super::bytes::u16_at;

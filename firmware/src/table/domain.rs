@@ -12,7 +12,7 @@
 //! | 0 | 1 | half-spaces n, 0..=56 |
 //! | 1 | 1 | the first m of them are the hull, m <= n |
 //! | 2 | 1 | look-aheads, 0..=4 |
-//! | 3 | 12 each | the half-spaces, see [`AffineFunction`]: a cell is inside where the value is not negative |
+//! | 3 | 12 each | the half-spaces, see [`AffineFunction`]: inside is 0 and above |
 //! | | 72 each | the look-aheads, see [`super::LookAhead`] |
 //! | | | the tree, see [`super::Node`] |
 //!

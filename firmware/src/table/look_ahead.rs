@@ -13,7 +13,7 @@
 //! | 2 | 2 | reserved, 0 |
 //! | 4 | 2 × 2 | cells of f in which the run ends well: first, last |
 //! | 8 | 2 × 2 | cells of f that a step must not leave: first, last |
-//! | 12 | 16 × 2 | factors F, row by row: of the indices f, g, l, p on the next f, then g, l, p (i16) |
+//! | 12 | 16 × 2 | factors F (i16): of the indices f, g, l, p on the next f, then g, l, p |
 //! | 44 | 4 × 4 | near offsets a of f, g, l, p (i32) |
 //! | 60 | 3 × 4 | far offsets b of g, l, p (i32) |
 //!

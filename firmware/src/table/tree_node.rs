@@ -16,7 +16,10 @@
 //! | 0 | 0..=63 | the left one is the leaf `child`; the right one follows |
 //! | 1 | 0..=63 | the right one is the leaf `child`; the left one follows |
 //! | 1 | 64..=127 | both are leaves: left is `child - 64`, right is the next byte (0..=63) |
-//! | 0 | 64..=255 | neither is a leaf: the left one follows, the right one `skip` bytes after it begins; skip is `child - 61`, or the next three bytes |
+//! | 0 | 64..=255 | neither is a leaf: the left one follows, the right one `skip` bytes later |
+//!
+//! `skip` counts from where the left one begins. It is `child - 61`, or the next three bytes if the
+//! child is 255.
 //!
 //! A node costs 2 bytes, 3 if both children are leaves: between 2 and 2.5 bytes a leaf. A tree that
 //! is one leaf is that one byte.

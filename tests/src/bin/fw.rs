@@ -1,6 +1,7 @@
 //! `cargo fw`: the images, built, run in QEMU and measured.
 //!
-//! Exit codes: 0 done; 1 host and target differ, or a figure is past its goal; 2 bad input or a missing tool.
+//! Exit codes: 0 done; 1 host and target differ, or a figure is past its goal; 2 bad input or a
+//! missing tool.
 
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -49,7 +50,8 @@ enum Command {
         #[arg(long)]
         log: bool,
     },
-    /// Processor in the loop: the pil image in QEMU against the same code on the host, compared to the bit
+    /// Processor in the loop: the pil image in QEMU against the same code on the host, compared to
+    /// the bit
     Pil {
         /// Random scenarios
         #[arg(long, default_value_t = 1000)]

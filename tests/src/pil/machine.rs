@@ -11,8 +11,6 @@ pub struct Machine {
     pub(super) qemu: &'static str,
     /// Its arguments that name the board.
     pub(super) board: &'static [&'static str],
-    /// Start of the TABLE region, from the memory map.
-    pub(super) table_address: &'static str,
 }
 
 /// The reference board's STM32F405 with its own code.
@@ -21,17 +19,18 @@ pub const CORTEX_M4: Machine = Machine {
     name: "Cortex-M4F",
     qemu: "qemu-system-arm",
     board: &["-machine", "netduinoplus2"],
-    table_address: "0x080E0000",
 };
 
-/// The same board with code for Cortex-M0+, whose instructions are a subset of its own: floating point is software.
+/// The same board with code for Cortex-M0+, whose instructions are a subset of its own: floating
+/// point is software.
 pub const CORTEX_M0: Machine = Machine {
     target: "thumbv6m-none-eabi",
     name: "Cortex-M0+ code",
     ..CORTEX_M4
 };
 
-/// A RISC-V core without floating point and without atomics: either would be an illegal instruction there.
+/// A RISC-V core without floating point and without atomics: either would be an illegal instruction
+/// there.
 pub const RISCV: Machine = Machine {
     target: "riscv32imc-unknown-none-elf",
     name: "RV32IMC",
@@ -44,5 +43,4 @@ pub const RISCV: Machine = Machine {
         "-bios",
         "none",
     ],
-    table_address: "0x800E0000",
 };

@@ -1,4 +1,5 @@
-//! Processor in the loop: the `pil` image in QEMU, the same session on the host, and a grid between them.
+//! Processor in the loop: the `pil` image in QEMU, the same session on the host, and a grid between
+//! them.
 
 pub mod machine;
 pub mod mains;

@@ -1,7 +1,8 @@
 //! The `pil` image on an emulated board, behind two FIFOs.
 //!
-//! The image opens `to-target` and `to-host` by semihosting in QEMU's working folder, a temporary one. When QEMU ends, a
-//! thread opens both FIFOs once more, so that a host that waits on one of them gets an error instead of waiting for ever.
+//! The image opens `to-target` and `to-host` by semihosting in QEMU's working folder, a temporary
+//! one. When QEMU ends, a thread opens both FIFOs once more, so that a host that waits on one of
+//! them gets an error instead of waiting for ever.
 
 use std::fs::{File, OpenOptions};
 use std::io::{self, Read, Write};
@@ -10,6 +11,7 @@ use std::process::{Child, Command, Stdio};
 use std::thread;
 
 use super::machine::Machine;
+use crate::images::Elf;
 use firmware::link::{
     self, FRAME_MAX, LENGTH_LEN, LinkError, Reply, Request, decode, record_length,
 };
@@ -57,8 +59,8 @@ pub struct Target {
 }
 
 impl Target {
-    /// Starts QEMU with the image and the table's bytes in the TABLE region. `count` makes the clock follow the
-    /// instructions executed (Arm).
+    /// Starts QEMU with the image and the table's bytes in the TABLE region. `count` makes the
+    /// clock follow the instructions executed (Arm).
     ///
     /// # Errors
     /// QEMU or `mkfifo` is missing, or the image does not open its files.
@@ -69,6 +71,9 @@ impl Target {
         count: bool,
     ) -> Result<Self, PilError> {
         let folder = tempfile::tempdir().map_err(io_error("temporary folder"))?;
+        let table_start = Elf::read(image)
+            .and_then(|elf| elf.table_start())
+            .map_err(|error| PilError::Io("image".into(), io::Error::other(error)))?;
         let table_file = folder.path().join("table.bin");
         std::fs::write(&table_file, table).map_err(io_error("table.bin"))?;
         let fifos = ["to-target", "to-host"].map(|name| folder.path().join(name));
@@ -91,9 +96,8 @@ impl Target {
             .arg(image)
             .arg("-device")
             .arg(format!(
-                "loader,file={},addr={},force-raw=on",
+                "loader,file={},addr={table_start:#x},force-raw=on",
                 table_file.display(),
-                machine.table_address
             ))
             .current_dir(folder.path())
             .stdin(Stdio::null());
@@ -148,7 +152,8 @@ fn release(mut child: Child, fifos: &[std::path::PathBuf; 2]) {
         .collect();
 }
 
-/// Instructions of an interval in ticks of the system timer, under `-icount`: one instruction lasts 2^shift ns.
+/// Instructions of an interval in ticks of the system timer, under `-icount`: one instruction lasts
+/// 2^shift ns.
 pub fn instructions(systick: u32) -> u32 {
     let nanoseconds = u64::from(systick) * 1000 / u64::from(CORE_MHZ);
     ((nanoseconds + (1 << (ICOUNT_SHIFT - 1))) >> ICOUNT_SHIFT) as u32

@@ -1,4 +1,5 @@
-//! Host and target in lock step: the same requests, answers compared to the bit, the target's answer closing the loop.
+//! Host and target in lock step: the same requests, answers compared to the bit, the target's
+//! answer closing the loop.
 
 use std::collections::VecDeque;
 

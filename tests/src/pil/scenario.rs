@@ -1,4 +1,5 @@
-//! What happens to the grid and the charger in a run: the paper's event, the recorded day, and random ones with faults.
+//! What happens to the grid and the charger in a run: the paper's event, the recorded day, and
+//! random ones with faults.
 
 use firmware::link::{Mains, Setup, SourceKind};
 use rand::{RngExt, SeedableRng};
@@ -58,7 +59,8 @@ pub fn event(bidirectional: bool) -> Scenario {
     }
 }
 
-/// The paper's event to its end: reserves replace the lost power from 200 s to 500 s, and the fleet is released; 25 min.
+/// The paper's event to its end: reserves replace the lost power from 200 s to 500 s, and the fleet
+/// is released; 25 min.
 pub fn recovery() -> Scenario {
     let replaced = (0..=20u32).map(|n| (2000 + 150 * n, 2.0 - 0.1 * f64::from(n)));
     Scenario {
@@ -68,7 +70,8 @@ pub fn recovery() -> Scenario {
     }
 }
 
-/// The n-th random scenario: any source, any charger, up to three losses or returns of load, up to four faults.
+/// The n-th random scenario: any source, any charger, up to three losses or returns of load, up to
+/// four faults.
 pub fn random(n: u64, ticks: u32) -> Scenario {
     let mut random = Pcg64::seed_from_u64(n);
     let source = [

@@ -1,0 +1,258 @@
+//! The reference board: STM32F405RG with a 25 MHz crystal. Its pins, clocks and peripherals, and
+//! nothing else; its memory is in `memory.x`.
+//!
+//! | pin | use | build |
+//! |---|---|---|
+//! | PA0 | zero crossings, rising (TIM5 channel 1) | unless `ade7953` |
+//! | PA4 to PA7 | ADE7953: select, SCLK, MISO, MOSI (SPI1) | `ade7953` |
+//! | PA8 | control pilot, 1 kHz (TIM1 channel 1) | unless `bidirectional` |
+//! | PB0 | contactor, high closes | unless `bidirectional` |
+//! | PA8 | signed power set-point, 1 kHz (TIM1 channel 1) | `bidirectional` |
+//! | PA2 | telemetry, 115 200 baud 8N1 (USART2) | always |
+//!
+//! The timer captures a crossing in hardware. The watchdog bites after four ticks without a
+//! completed one, and a panic ends in it too.
+
+use embedded_hal::spi::{ErrorType, MODE_3, Operation, SpiDevice};
+use embedded_hal_nb::serial::Write as _;
+use firmware::board::{Board, Hardware, Rest};
+use firmware::charger::Watchdog;
+use firmware::dispatch::pilot::PILOT_HZ;
+use firmware::fault::ResetCause;
+use firmware::frequency::zero_crossing::Captures;
+use stm32f4xx_hal::gpio::{Output, PA0, PA4, PA5, PA6, PA7, PA8, PB0};
+use stm32f4xx_hal::pac::{self, SPI1, TIM1, TIM2, TIM5, USART2};
+use stm32f4xx_hal::prelude::*;
+use stm32f4xx_hal::rcc::{Config, Rcc};
+use stm32f4xx_hal::serial::config::Config as SerialConfig;
+use stm32f4xx_hal::serial::{Serial, Tx};
+use stm32f4xx_hal::signature::Uid;
+use stm32f4xx_hal::spi;
+use stm32f4xx_hal::timer::capture::{CaptureChannel, CaptureHzManager};
+use stm32f4xx_hal::timer::{CapturePolarity, CounterUs, Flag, PwmChannel, Timer};
+use stm32f4xx_hal::watchdog::IndependentWatchdog;
+
+/// Crystal of the board \[MHz\].
+const CRYSTAL_MHZ: u32 = 25;
+/// Tolerance of the crystal \[ppm\].
+const CRYSTAL_PPM: u16 = 20;
+/// Core and timer clock \[MHz\].
+const CORE_MHZ: u32 = 84;
+/// Timer of the captures \[Hz\]; divides the timer clock.
+const CAPTURE_HZ: u32 = 1_000_000;
+/// Longest time without a completed tick \[ms\].
+const WATCHDOG_MS: u32 = 400;
+/// Telemetry \[baud\].
+const BAUD: u32 = 115_200;
+/// Clock of the SPI \[kHz\]: slow enough for pins at their lowest slew rate.
+const SPI_KHZ: u32 = 1_000;
+/// Time waited from chip select to the first edge, and from the last edge to release \[µs\].
+const SETTLE_US: u32 = 2;
+
+const _: () = assert!((CORE_MHZ * 1_000_000).is_multiple_of(CAPTURE_HZ));
+
+/// The board, started.
+pub(crate) struct Started {
+    /// What meter and drive are set up on.
+    pub(crate) hardware: Pins,
+    /// Time and telemetry.
+    pub(crate) board: Lines,
+    /// The watchdog, running.
+    pub(crate) watchdog: Dog,
+    /// Why the controller started.
+    pub(crate) cause: ResetCause,
+    /// A number of this chip, for its place in the fleet.
+    pub(crate) serial: u32,
+}
+
+/// Starts clocks, time, telemetry and watchdog; `None` if one of them does not start, or a second
+/// time.
+pub(crate) fn start() -> Option<Started> {
+    let peripherals = pac::Peripherals::take()?;
+    let cause = reset_cause(&peripherals.RCC);
+    let clocks = Config::hse(CRYSTAL_MHZ.MHz()).sysclk(CORE_MHZ.MHz());
+    let mut rcc = peripherals.RCC.freeze(clocks);
+    let port_a = peripherals.GPIOA.split(&mut rcc);
+    let port_b = peripherals.GPIOB.split(&mut rcc);
+    let baud = SerialConfig::default().baudrate(BAUD.bps());
+    let line = Serial::tx(peripherals.USART2, port_a.pa2, baud, &mut rcc).ok()?;
+    let mut timer = peripherals.TIM2.counter_us(&mut rcc);
+    timer.start(u32::MAX.micros()).ok()?;
+    let mut watchdog = IndependentWatchdog::new(peripherals.IWDG);
+    watchdog.start(WATCHDOG_MS.millis());
+    let spi = (
+        peripherals.SPI1,
+        port_a.pa4,
+        port_a.pa5,
+        port_a.pa6,
+        port_a.pa7,
+    );
+    Some(Started {
+        hardware: Pins {
+            rcc,
+            spi: Some(spi),
+            capture: Some((peripherals.TIM5, port_a.pa0)),
+            pwm: Some((peripherals.TIM1, port_a.pa8)),
+            coil: Some(port_b.pb0),
+        },
+        board: Lines { timer, line },
+        watchdog: Dog(watchdog),
+        cause,
+        serial: serial_number(),
+    })
+}
+
+/// Why the controller started; power-on sets the brown-out flag as well, so it is asked first.
+fn reset_cause(rcc: &pac::RCC) -> ResetCause {
+    let flags = rcc.csr().read();
+    rcc.csr().modify(|_, w| w.rmvf().clear());
+    if flags.wdgrstf().bit() {
+        ResetCause::Watchdog
+    } else if flags.borrstf().bit() && !flags.porrstf().bit() {
+        ResetCause::BrownOut
+    } else {
+        ResetCause::PowerOn
+    }
+}
+
+fn serial_number() -> u32 {
+    let uid = Uid::get();
+    let lot = uid.lot_num().bytes().fold(0u32, |number, byte| {
+        number.wrapping_mul(31).wrapping_add(u32::from(byte))
+    });
+    let die = (u32::from(uid.x()) << 16) ^ u32::from(uid.y());
+    lot.wrapping_mul(0x0100_0193) ^ die ^ (u32::from(uid.waf_num()) << 8)
+}
+
+/// The independent watchdog, which runs on its own oscillator.
+pub(crate) struct Dog(IndependentWatchdog);
+
+impl Watchdog for Dog {
+    fn feed(&mut self) {
+        self.0.feed();
+    }
+}
+
+/// Time (TIM2) and telemetry (USART2).
+pub(crate) struct Lines {
+    timer: CounterUs<TIM2>,
+    line: Tx<USART2>,
+}
+
+impl Board for Lines {
+    fn now_us(&mut self) -> u32 {
+        self.timer.now().ticks()
+    }
+
+    fn send(&mut self, byte: u8) -> bool {
+        self.line.write(byte).is_ok()
+    }
+}
+
+/// Pins and peripherals that are not set up yet.
+pub(crate) struct Pins {
+    rcc: Rcc,
+    spi: Option<(SPI1, PA4, PA5, PA6, PA7)>,
+    capture: Option<(TIM5, PA0)>,
+    pwm: Option<(TIM1, PA8)>,
+    coil: Option<PB0>,
+}
+
+impl Hardware for Pins {
+    type Spi = Chip;
+    type Captures = Crossings;
+    type Pwm = PwmChannel<TIM1, 0>;
+    type Coil = PB0<Output>;
+
+    fn spi(&mut self) -> Option<Chip> {
+        let (bus, select, clock, data_in, data_out) = self.spi.take()?;
+        let mut select = select.into_push_pull_output();
+        select.set_high();
+        let pins = (Some(clock), Some(data_in), Some(data_out));
+        let bus = bus.spi(pins, MODE_3, SPI_KHZ.kHz(), &mut self.rcc);
+        Some(Chip { bus, select })
+    }
+
+    fn captures(&mut self) -> Option<Crossings> {
+        let (timer, pin) = self.capture.take()?;
+        let timer = Timer::new(timer, &mut self.rcc);
+        let (timer, (channel, ..)) = timer.capture_hz(CAPTURE_HZ.Hz());
+        let mut channel = channel.with(pin);
+        channel.set_polarity(CapturePolarity::ActiveHigh);
+        channel.enable();
+        Some(Crossings { timer, channel })
+    }
+
+    fn pwm(&mut self, rest: Rest) -> Option<PwmChannel<TIM1, 0>> {
+        let (timer, line) = self.pwm.take()?;
+        let (_, (channel, ..)) = Timer::new(timer, &mut self.rcc).pwm_hz(PILOT_HZ.Hz());
+        let mut pwm = channel.with(line);
+        pwm.set_duty(match rest {
+            Rest::Low => 0,
+            Rest::High => pwm.get_max_duty(),
+        });
+        pwm.enable();
+        Some(pwm)
+    }
+
+    fn coil(&mut self) -> Option<PB0<Output>> {
+        Some(self.coil.take()?.into_push_pull_output())
+    }
+}
+
+/// Rising edges on PA0, captured by TIM5 in hardware.
+pub(crate) struct Crossings {
+    timer: CaptureHzManager<TIM5>,
+    channel: CaptureChannel<TIM5, 0>,
+}
+
+impl Captures for Crossings {
+    const TIMER_HZ: u32 = CAPTURE_HZ;
+    const CLOCK_PPM: u16 = CRYSTAL_PPM;
+
+    fn take(&mut self) -> Option<u32> {
+        // Reading the capture register clears its flag.
+        let captured = self.timer.flags().contains(Flag::C1);
+        captured.then(|| self.channel.get_capture())
+    }
+}
+
+/// A chip alone on SPI1: a frame is what is transferred while it is selected.
+pub(crate) struct Chip {
+    bus: spi::Spi<SPI1>,
+    select: PA4<Output>,
+}
+
+impl ErrorType for Chip {
+    type Error = spi::Error;
+}
+
+impl Chip {
+    fn transfer(&mut self, operations: &mut [Operation<'_, u8>]) -> Result<(), spi::Error> {
+        for operation in operations {
+            match operation {
+                Operation::Read(words) => self.bus.read(words)?,
+                Operation::Write(words) => self.bus.write(words)?,
+                Operation::Transfer(read, write) => self.bus.transfer(read, write)?,
+                Operation::TransferInPlace(words) => self.bus.transfer_in_place(words)?,
+                Operation::DelayNs(ns) => wait_us(ns.div_ceil(1000)),
+            }
+        }
+        self.bus.flush()
+    }
+}
+
+impl SpiDevice for Chip {
+    fn transaction(&mut self, operations: &mut [Operation<'_, u8>]) -> Result<(), spi::Error> {
+        self.select.set_low();
+        wait_us(SETTLE_US);
+        let done = self.transfer(operations);
+        wait_us(SETTLE_US);
+        self.select.set_high();
+        done
+    }
+}
+
+fn wait_us(us: u32) {
+    cortex_m::asm::delay(us.saturating_mul(CORE_MHZ));
+}
