@@ -61,11 +61,12 @@ pub struct Charger<'t, S, D, W> {
     tick_ms: u16,
     gate: Gate,
     filter: Filter,
-    /// `None` without a table.
+    /// `None` without a table, and for a response whose plant has a chain that is too fast for the
+    /// tick.
     observer: Option<Observer>,
     control: ControlLoop<'t>,
     droop: Droop,
-    /// `None` without a table.
+    /// `None` without a table and for a response.
     event: Option<EventWatch>,
     /// Restarted by a fault, and the warm-up that follows is not over.
     restarted: bool,
@@ -107,16 +108,19 @@ impl<'t, S: FrequencySource, D: Dispatch, W: Watchdog> Charger<'t, S, D, W> {
         config: ChargerConfig,
         cause: ResetCause,
     ) -> Self {
+        // A response needs no state estimate and knows no event.
+        let always_on = table.as_ref().is_ok_and(|view| view.response().is_some());
         let (tick_ms, delay_ticks, droop, plant, event) = match &table {
             Ok(view) => {
                 let header = view.header();
-                let event = EventWatch::new(config.event_end, header.outer, header.tick_ms);
+                let event = (!always_on)
+                    .then(|| EventWatch::new(config.event_end, header.outer, header.tick_ms));
                 (
                     header.tick_ms,
                     header.delay_ticks,
                     header.droop,
                     Some(header.plant),
-                    Some(event),
+                    event,
                 )
             }
             Err(_) => (TICK_MS_DEFAULT, 0, Droop::PAPER, None, None),
@@ -125,13 +129,14 @@ impl<'t, S: FrequencySource, D: Dispatch, W: Watchdog> Charger<'t, S, D, W> {
             let coefficients = ObserverConfig::new(&plant, tick_ms).ok()?;
             Some(Observer::at_rest(coefficients, &plant, 0))
         });
-        // A chain that is too fast for the tick makes the table as useless as a broken one.
-        let unusable = observer.is_none() && table.is_ok();
+        // A chain that is too fast for the tick makes a table by games as useless as a broken one.
+        let unusable = observer.is_none() && table.is_ok() && !always_on;
         if unusable {
             table = Err(TableError::bad_field(&field::GOVERNOR_TIME));
         }
         let warm_up_ticks = config.warm_up_ticks.unwrap_or_else(|| {
-            plant.map_or(0, |plant| trust_ticks(&plant, tick_ms).max(delay_ticks))
+            let trusts = plant.filter(|_| !always_on);
+            trusts.map_or(0, |plant| trust_ticks(&plant, tick_ms).max(delay_ticks))
         });
         let gate = Gate::new(
             config.gate,
@@ -148,7 +153,7 @@ impl<'t, S: FrequencySource, D: Dispatch, W: Watchdog> Charger<'t, S, D, W> {
             gate,
             filter: Filter::new(config.filter_ticks),
             observer,
-            control: ControlLoop::with_table(table),
+            control: ControlLoop::with_table(table).with_offset(config.level_offset),
             droop,
             event,
             restarted: cause != ResetCause::PowerOn,
@@ -209,7 +214,11 @@ impl<'t, S: FrequencySource, D: Dispatch, W: Watchdog> Charger<'t, S, D, W> {
         if self.control.table_error().is_some() {
             faults.insert(Faults::TABLE_REJECTED);
         }
-        if self.standing.mode == Mode::WarmUp || self.warm_up_left > 0 {
+        let window_fills = self
+            .control
+            .response()
+            .is_some_and(|response| !response.is_full());
+        if self.standing.mode == Mode::WarmUp || self.warm_up_left > 0 || window_fills {
             if self.restarted {
                 faults.insert(Faults::RESTARTED);
             }
@@ -258,7 +267,7 @@ impl<'t, S: FrequencySource, D: Dispatch, W: Watchdog> Charger<'t, S, D, W> {
     fn start_again(&mut self) {
         self.warm_up_left = self.warm_up_ticks;
         self.filter.reset();
-        self.control.reset();
+        self.control.lose_track();
         if let Some(event) = &mut self.event {
             event.reset();
         }
@@ -286,6 +295,9 @@ impl<'t, S: FrequencySource, D: Dispatch, W: Watchdog> Charger<'t, S, D, W> {
                 from.wrapping_add_unsigned(way)
             };
             self.advance(at);
+            if n < due {
+                self.control.pass(at);
+            }
         }
         if due > 0 {
             // What was held stayed held: one decision, however many ticks were missed.
@@ -365,9 +377,9 @@ impl<'t, S: FrequencySource, D: Dispatch, W: Watchdog> Charger<'t, S, D, W> {
 
     fn without_frequency(&mut self, due: u16) {
         self.lost_ticks = self.lost_ticks.saturating_add(due);
+        self.control.miss(due);
         if self.lost_ticks <= self.config.hold_ticks {
             self.standing.mode = Mode::Hold;
-            self.control.hold(due);
             // The chain follows the last frequency; the loss estimate would see a kink that was not
             // there.
             for _ in 0..due {
@@ -379,6 +391,8 @@ impl<'t, S: FrequencySource, D: Dispatch, W: Watchdog> Charger<'t, S, D, W> {
             let release = self.config.release_ppm.saturating_mul(u32::from(due));
             let ppm = self.standing.participation.ppm().saturating_sub(release);
             self.standing.participation = Participation::from_ppm(ppm);
+            // A response goes on from what was commanded last; other tables start again anyway.
+            let _ = self.control.command(self.standing.participation);
         }
         self.standing.loss_kw = None;
         if let Some(observer) = &mut self.observer {

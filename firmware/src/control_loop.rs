@@ -3,6 +3,9 @@
 //! The loop never fails: a rejected table or a state that no law covers is answered by the baseline
 //! droop, and the action says so.
 //!
+//! A table that is a response ([`crate::response`]) needs f alone. Its law is total, so there is no
+//! outside and no event to end.
+//!
 //! ## Commands that act late
 //! Where the table's commands act with a delay, the loop remembers those that are under way and
 //! decides on the predicted state ([`crate::prediction`]). The memory holds levels. So the droop
@@ -16,6 +19,7 @@
 use crate::droop::Droop;
 use crate::phase::{Phase, PhaseState, Step};
 use crate::prediction::{DELAY_TICKS_MAX, History};
+use crate::response::{LevelOffset, Response};
 use crate::table::{Header, TableError, TableView};
 use crate::units::{Participation, State};
 
@@ -48,6 +52,8 @@ pub struct ControlLoop<'t> {
     droop: Droop,
     state: PhaseState,
     history: History,
+    /// `None` for a table by games.
+    response: Option<Response>,
 }
 
 impl<'t> ControlLoop<'t> {
@@ -63,12 +69,36 @@ impl<'t> ControlLoop<'t> {
             Ok(view) => view.header().droop,
             Err(_) => Droop::PAPER,
         };
+        let response = table.as_ref().ok().and_then(|view| {
+            let tick_ms = view.header().tick_ms;
+            let law = *view.response()?;
+            Some(Response::new(law, tick_ms, LevelOffset::NONE))
+        });
+        let mut state = PhaseState::INITIAL;
+        if response.is_some() {
+            state.phase = Phase::Response;
+        }
         Self {
             table,
             droop,
-            state: PhaseState::INITIAL,
+            state,
             history: History::NONE,
+            response,
         }
+    }
+
+    /// The same with this charger's levels of a response shifted.
+    #[must_use]
+    pub const fn with_offset(mut self, offset: LevelOffset) -> Self {
+        if let Some(response) = &mut self.response {
+            response.set_offset(offset);
+        }
+        self
+    }
+
+    /// What a response remembers; `None` for a table by games, and without a table.
+    pub const fn response(&self) -> Option<&Response> {
+        self.response.as_ref()
     }
 
     /// Why the table was rejected, if it was.
@@ -113,6 +143,13 @@ impl<'t> ControlLoop<'t> {
                 source: Source::DroopNoTable,
             };
         };
+        if let Some(response) = &mut self.response {
+            return Action {
+                participation: response.step(state.frequency_uhz()),
+                phase: Phase::Response,
+                source: Source::Table,
+            };
+        }
         let ahead = || match table.prediction() {
             Some(prediction) => prediction.predict(state, &self.history),
             None => state,
@@ -136,6 +173,9 @@ impl<'t> ControlLoop<'t> {
     #[must_use = "this, not the participation given, is what the loop has noted as commanded"]
     #[inline(never)]
     pub fn command(&mut self, participation: Participation) -> Participation {
+        if let Some(response) = &mut self.response {
+            response.impose(participation);
+        }
         let Some(header) = self.delayed() else {
             return participation;
         };
@@ -172,9 +212,26 @@ impl<'t> ControlLoop<'t> {
         self.hold(ticks);
     }
 
+    /// Takes a frequency into a response's window for a tick at which nothing is decided: the tick
+    /// was missed, and its frequency lies between its neighbours'. Tables by games need no more
+    /// than [`ControlLoop::skip`].
+    pub fn pass(&mut self, f_uhz: i32) {
+        if let Some(response) = &mut self.response {
+            response.pass(f_uhz);
+        }
+    }
+
+    /// Takes note that for so many ticks there was no reading, and that the last command was held.
+    pub fn miss(&mut self, ticks: u16) {
+        if let Some(response) = &mut self.response {
+            response.miss(ticks);
+        }
+        self.hold(ticks);
+    }
+
     /// Takes note that the last command was held for ticks at which nothing was decided.
     #[inline(never)]
-    pub fn hold(&mut self, ticks: u16) {
+    fn hold(&mut self, ticks: u16) {
         if self.delayed().is_some() {
             let last = self.history.level(0);
             for _ in 0..ticks.min(DELAY_TICKS_MAX) {
@@ -183,15 +240,30 @@ impl<'t> ControlLoop<'t> {
         }
     }
 
-    /// Forgets the event: back to No control. The commands under way are still known.
+    /// Forgets the event: back to No control. The commands under way are still known. A response
+    /// knows no event.
     pub const fn end_event(&mut self) {
-        self.state = PhaseState::INITIAL;
+        if self.response.is_none() {
+            self.state = PhaseState::INITIAL;
+        }
     }
 
     /// Forgets the event and the commands under way, as after a restart: nobody knows them until
     /// the delay has passed.
     pub fn reset(&mut self) {
+        self.lose_track();
+        if let Some(response) = &mut self.response {
+            response.reset();
+        }
+    }
+
+    /// The readings that follow have nothing to do with those before. As [`ControlLoop::reset`], but
+    /// a response keeps its command and its slope response.
+    pub fn lose_track(&mut self) {
         self.end_event();
         self.history = History::NONE;
+        if let Some(response) = &mut self.response {
+            response.restart();
+        }
     }
 }

@@ -11,6 +11,7 @@
 //! | [`table`] | a cell | an input level, or "outside" |
 //! | [`prediction`] | state and commands under way | the state in which a command begins to act |
 //! | [`phase`] | state and table | the law in force: No control, C1, C2, Fixed, Hold |
+//! | [`response`] | a frequency and its slope | a participation, by a law that is always on |
 //! | [`droop`] | a frequency | the baseline participation, used as the fallback |
 //! | [`control_loop`] | one state a tick | one [`control_loop::Action`] a tick |
 //! | [`event`] | f over minutes | the end of an event, and the way back to ordinary charging |
@@ -43,6 +44,8 @@ pub mod table;
 pub mod prediction;
 
 pub mod phase;
+
+pub mod response;
 
 pub mod droop;
 

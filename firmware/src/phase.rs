@@ -33,17 +33,20 @@ pub enum Phase {
     Hold = 4,
     /// No law has an entry for the state: the baseline droop.
     Fallback = 5,
+    /// The law that is always on ([`crate::response`]); its tables have no other phase.
+    Response = 6,
 }
 
 impl Phase {
     /// All phases in the order of their numbers.
-    pub const ALL: [Self; 6] = [
+    pub const ALL: [Self; 7] = [
         Self::NoControl,
         Self::C1,
         Self::C2,
         Self::Fixed,
         Self::Hold,
         Self::Fallback,
+        Self::Response,
     ];
 
     /// The phase's number, as telemetry and the link carry it.
@@ -60,6 +63,7 @@ impl Phase {
             Self::Fixed => "fixed",
             Self::Hold => "hold",
             Self::Fallback => "fallback",
+            Self::Response => "response",
         }
     }
 }

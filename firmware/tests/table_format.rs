@@ -12,6 +12,7 @@ use firmware::droop::Droop;
 use firmware::grid::{Cell, Grid};
 use firmware::phase::Phase;
 use firmware::prediction::{History, prediction_len};
+use firmware::response::ResponseLaw;
 use firmware::table::field::{Field, entry};
 use firmware::table::*;
 use firmware::units::{Band, Participation, State};
@@ -46,6 +47,7 @@ fn header() -> Header {
         input_step_ppm: 50_000,
         levels: 4,
         stay: true,
+        always_on: false,
         tick_ms: 100,
         period_ticks: 15,
         delay_ticks: 0,
@@ -62,8 +64,64 @@ fn header() -> Header {
             full_uhz: 500_000,
         },
         plant: PlantParameters::PAPER,
+        hypotheses: Hypotheses {
+            estimate_error: [2_000, 10_000, 20_000, 30_000],
+            meter_lag_ms: [50, 70],
+            actuation_delay_ms: [100, 500],
+            participation_relative_ppm: 100_000,
+            participation_absolute_ppm: 1_000,
+            loss_kw: [-1, 2_200_000],
+            loss_profile: LossProfile::NonDecreasing,
+            direction: Direction::Bidirectional,
+            own_clocks: true,
+            tick_most_ms: 120,
+            inertia_kw_s_per_hz: [2_040_000, 5_000_000],
+            governor_gain_kw_per_hz: [-5_000_000, -4_000_000],
+            damping_kw_per_hz: [800_000, 1_000_000],
+            power_per_charger_w: 56_000,
+            chargers: 25_000,
+            table_version: 7,
+            generator: 0x0100_2003,
+        },
         laws: [None; LAWS],
     }
+}
+
+/// The bidirectional fleet's law.
+const LAW: ResponseLaw = ResponseLaw {
+    droop_gain_ppm_per_hz: 4_285_714,
+    setpoint_uhz: -50_000,
+    slope_gain_ppm_s_per_hz: 1_428_571,
+    slope_threshold_uhz_per_s: 30_000,
+    window_ticks: 5,
+    slope_most_ppm: 642_857,
+    release_ppm: 3_571,
+    smallest_change_ppm: 50_000,
+};
+
+/// The law by hand.
+const LAW_BYTES: [u8; 32] = [
+    0x12, 0x65, 0x41, 0x00, // 4 285 714
+    0xB0, 0x3C, 0xFF, 0xFF, // -50 000
+    0x5B, 0xCC, 0x15, 0x00, // 1 428 571
+    0x30, 0x75, 0x00, 0x00, // 30 000
+    0x05, 0x00, 0x00, 0x00, // 5
+    0x29, 0xCF, 0x09, 0x00, // 642 857
+    0xF3, 0x0D, 0x00, 0x00, // 3 571
+    0x50, 0xC3, 0x00, 0x00, // 50 000
+];
+
+/// An image that is a response.
+fn response_image() -> Vec<u8> {
+    let header = Header {
+        always_on: true,
+        ..header()
+    };
+    let mut image = write_header(&header).to_vec();
+    image.extend(LAW_BYTES);
+    image.extend([0; CRC_LEN]);
+    seal(&mut image).unwrap();
+    image
 }
 
 /// An image with the tree as C1, and a dense law of one cell as Hold.
@@ -115,31 +173,45 @@ fn header_bytes_are_as_documented() {
     let golden: &[(usize, &[u8])] = &[
         (0, b"HFDT"),
         (4, &[0xFF, 0xFE]),
-        (6, &[2, 0]),
-        (8, &[241, 0, 0, 0]),
+        (6, &[3, 0]),
+        (8, &[69, 1, 0, 0]),
         (12, b"0123456789abcdef"),
         (28, &[0xFC, 0xFF, 0xFF, 0xFF, 0xFD, 0xFF, 0xFF, 0xFF]),
         (36, &[0, 0, 0, 0, 5, 0, 0, 0]),
         (44, &[2, 0, 0, 0, 3, 0, 0, 0, 4, 0, 0, 0, 5, 0, 0, 0]),
         (60, &[4, 0, 3, 0, 2, 0, 2, 0]),
         (68, &[0x50, 0xC3, 0, 0]),
-        (72, &[4, 1]),
+        (72, &[4, 5]),
         (74, &[100, 0, 15, 0, 0, 0]),
         // -300 000 is 0xFFFB6C20.
         (80, &[0x20, 0x6C, 0xFB, 0xFF, 0, 0, 0, 0]),
         (96, &[0xF0, 0x49, 0x02, 0, 0x20, 0xA1, 0x07, 0]),
         // -5 000 000 is 0xFFB3B4C0.
         (104, &[0xC0, 0xB4, 0xB3, 0xFF]),
-        (136, &[1, 1, 4, 0, 30, 0, 0, 0, 18, 0, 0, 0]),
-        (148, &[255, 255, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0]),
-        (160, &[0, 0, 1, 0, 0, 0, 0, 0, 17, 0, 0, 0]),
-        (172, &DOMAIN),
-        (202, &TREE),
+        (136, &[0xD0, 0x07, 0, 0, 0x10, 0x27, 0, 0]),
+        (144, &[0x20, 0x4E, 0, 0, 0x30, 0x75, 0, 0]),
+        (152, &[50, 0, 70, 0, 100, 0, 0xF4, 1]),
+        (160, &[0xA0, 0x86, 1, 0, 0xE8, 3, 0, 0]),
+        // 2 200 000 is 0x2191C0.
+        (168, &[0xFF, 0xFF, 0xFF, 0xFF, 0xC0, 0x91, 0x21, 0]),
+        (176, &[2, 1, 120, 0]),
+        // 2 040 000 is 0x1F20C0, 5 000 000 is 0x4C4B40.
+        (180, &[0xC0, 0x20, 0x1F, 0, 0x40, 0x4B, 0x4C, 0]),
+        // -4 000 000 is 0xFFC2F700.
+        (188, &[0xC0, 0xB4, 0xB3, 0xFF, 0x00, 0xF7, 0xC2, 0xFF]),
+        (196, &[0x00, 0x35, 0x0C, 0, 0x40, 0x42, 0x0F, 0]),
+        (204, &[0xC0, 0xDA, 0, 0, 0xA8, 0x61, 0, 0]),
+        (212, &[7, 0, 0, 0, 0x03, 0x20, 0x00, 0x01]),
+        (220, &[1, 1, 4, 0, 30, 0, 0, 0, 18, 0, 0, 0]),
+        (232, &[255, 255, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0]),
+        (244, &[0, 0, 1, 0, 0, 0, 0, 0, 17, 0, 0, 0]),
+        (256, &DOMAIN),
+        (286, &TREE),
     ];
     for (at, bytes) in golden {
         assert_eq!(&image[*at..*at + bytes.len()], *bytes, "at {at}");
     }
-    assert_eq!(image.len(), 241);
+    assert_eq!(image.len(), 325);
     let table = TableView::parse(&image).unwrap();
     let mut expected = header();
     expected.laws = table.header().laws;
@@ -149,6 +221,108 @@ fn header_bytes_are_as_documented() {
         image[field::SPEC_HASH.start..HEADER_LEN],
         "what was read is written again"
     );
+}
+
+#[test]
+fn a_response_lies_between_header_and_crc() {
+    let image = response_image();
+    assert_eq!(image.len(), HEADER_LEN + RESPONSE_LEN + CRC_LEN);
+    assert_eq!(image[field::FLAGS], [7]);
+    assert_eq!(write_response(&LAW), LAW_BYTES);
+    let table = TableView::parse(&image).unwrap();
+    assert_eq!(table.response(), Some(&LAW));
+    assert!(table.header().always_on && table.prediction().is_none());
+    assert_eq!(table.lookup(Law::C1, Cell([0; 4])), None);
+    assert_eq!(TableView::parse(&self::image()).unwrap().response(), None);
+    // Every bit counts, and no byte may be missing.
+    for at in 0..image.len() {
+        for bit in 0..8 {
+            let mut wrong = image.clone();
+            wrong[at] ^= 1 << bit;
+            assert!(TableView::parse(&wrong).is_err(), "bit {bit} of byte {at}");
+        }
+        let mut shorter = image[..at].to_vec();
+        let _ = seal(&mut shorter);
+        assert!(TableView::parse(&shorter).is_err(), "cut at {at}");
+    }
+}
+
+#[test]
+fn a_response_out_of_range_is_named_by_its_offset() {
+    use field::response;
+    let wrong = |at: usize, bytes: &[u8]| {
+        let mut image = response_image();
+        image[at..at + bytes.len()].copy_from_slice(bytes);
+        seal(&mut image).unwrap();
+        error(&image)
+    };
+    let cases: &[(Field, u32)] = &[
+        (response::DROOP_GAIN, 1_000_000_001),
+        (response::WINDOW, 0),
+        (response::WINDOW, 33),
+        (response::WINDOW, 65_541),
+        (response::SLOPE_MOST, 1_000_001),
+        (response::RELEASE, 1_000_001),
+        (response::SMALLEST_CHANGE, 0),
+        (response::SMALLEST_CHANGE, 1_000_001),
+    ];
+    for (field, word) in cases {
+        let at = HEADER_LEN + field.start;
+        let offset = at as u16;
+        let found = wrong(at, &word.to_le_bytes());
+        assert_eq!(found, TableError::BadField { offset }, "{word}");
+    }
+    // A response predicts nothing, and has no laws beside it.
+    let offset = field::DELAY.start as u16;
+    let found = wrong(field::DELAY.start, &[1, 0]);
+    assert_eq!(found, TableError::BadField { offset });
+    let offset = field::DIRECTORY.start as u16;
+    let found = wrong(field::DIRECTORY.start, &[1, 1]);
+    assert_eq!(found, TableError::BadField { offset });
+    // Without the flag the same bytes are no table.
+    assert!(matches!(
+        wrong(field::FLAGS.start, &[5]),
+        TableError::BadBlock { .. }
+    ));
+    let mut bare = write_header(&Header {
+        always_on: true,
+        ..header()
+    })
+    .to_vec();
+    bare.extend([0; CRC_LEN]);
+    seal(&mut bare).unwrap();
+    let offset = field::FLAGS.start as u16;
+    assert_eq!(error(&bare), TableError::BadField { offset });
+}
+
+#[test]
+fn a_response_answers_every_frequency_and_knows_no_event() {
+    let image = response_image();
+    let mut control = ControlLoop::new(&image);
+    assert_eq!(control.phase_state().phase, Phase::Response);
+    for f in [i32::MIN, -50_000, 0, i32::MAX] {
+        let action = control.step(State([f, 0, 0, 0]));
+        assert_eq!(action.phase, Phase::Response);
+        assert_eq!(action.source, Source::Table);
+    }
+    control.end_event();
+    assert_eq!(control.phase_state().phase, Phase::Response);
+    // Something else is commanded: small changes are measured from there. 4.285714 · 100 mHz is 428
+    // 571.
+    let mut control = ControlLoop::new(&image);
+    let given = Participation::from_ppm(400_000);
+    assert_eq!(control.command(given), given);
+    let kept = control.step(State([-150_000, 0, 0, 0]));
+    assert_eq!(kept.participation.ppm(), 400_000);
+    // A missed tick belongs to the window, a tick without a reading ends it.
+    for f in 1..=5 {
+        control.pass(-150_000 - 20_000 * f);
+    }
+    // 200 mHz/s over the full window, 170 of them count: 242 857.
+    assert_eq!(control.response().unwrap().held_ppm(), 242_857);
+    control.miss(2);
+    assert_eq!(control.response().unwrap().held_ppm(), 235_715);
+    assert!(!control.response().unwrap().is_full());
 }
 
 /// The image with commands that act a tick late: Φ the identity but f falls by g/2; W = 7 on l; G_1
@@ -223,7 +397,7 @@ fn a_delayed_loop_watches_what_is_and_decides_on_what_will_be() {
         assert_eq!(control.step(State([9_999_999; 4])).phase, Phase::C1);
     }
     // Held by others: what is under way is the same level, 256 on g.
-    control.hold(3);
+    control.miss(3);
     let again = control.step(State([-3 - 128, -256, -7, 13]));
     assert_eq!((again.phase, again.source), (Phase::C1, Source::Table));
     control.reset();
@@ -334,11 +508,11 @@ fn the_frame_names_what_was_found_and_what_is_supported() {
     };
     assert_eq!(with(field::VERSION, &[7, 0]), version);
     let length = TableError::WrongLength {
-        found: 241,
-        stated: 242,
+        found: 325,
+        stated: 326,
     };
-    assert_eq!(with(field::LENGTH, &[242, 0, 0, 0]), length);
-    assert!(matches!(with(200..201, &[9]), TableError::BadCrc { .. }));
+    assert_eq!(with(field::LENGTH, &[70, 1, 0, 0]), length);
+    assert!(matches!(with(290..291, &[9]), TableError::BadCrc { .. }));
     let foreign = TableView::parse_for_spec(&image, [0; SPEC_HASH_LEN]).unwrap_err();
     assert_eq!(
         foreign,
@@ -360,8 +534,11 @@ fn header_fields_out_of_range_are_named_by_their_offset() {
         (field::LEVELS, &[0]),
         (field::LEVELS, &[33]),
         (field::INPUT_STEP, &[0xFF; 4]),
-        (field::FLAGS, &[2]),
+        // An unknown flag; a response that the image has no room for is seen at the directory.
+        (field::FLAGS, &[8]),
         (field::TICK, &[0, 0]),
+        // 201 ms, longer than any watchdog allows.
+        (field::TICK, &[201, 0]),
         (field::PERIOD, &[0, 0]),
         // A prediction part that the image does not have, and more ticks than the device remembers.
         (field::DELAY, &[1, 0]),
@@ -374,6 +551,22 @@ fn header_fields_out_of_range_are_named_by_their_offset() {
         (field::TURBINE_TIME, &[0; 4]),
         (field::LAG_TIME, &[0; 4]),
         (field::INERTIA, &[0; 4]),
+        // Each interval with its ends swapped, or nothing where there must be something.
+        (field::METER_LAG, &[71, 0]),
+        (field::ACTUATION_DELAY, &[0xF5, 1]),
+        (field::PARTICIPATION_RELATIVE, &[0x40, 0x42, 0x0F, 0]),
+        (field::PARTICIPATION_ABSOLUTE, &[0x40, 0x42, 0x0F, 0]),
+        (field::LOSS, &[0xC1, 0x91, 0x21, 0]),
+        (field::LOSS_PROFILE, &[3]),
+        (field::DIRECTION, &[2]),
+        // Shorter than the tick.
+        (field::TICK_MOST, &[99, 0]),
+        (field::INERTIA_BAND, &[0; 4]),
+        (field::INERTIA_BAND, &[0x41, 0x4B, 0x4C, 0]),
+        (field::GOVERNOR_GAIN_BAND, &[0x01, 0xF7, 0xC2, 0xFF]),
+        (field::DAMPING_BAND, &[0x41, 0x42, 0x0F, 0]),
+        (field::POWER_PER_CHARGER, &[0; 4]),
+        (field::CHARGERS, &[0; 4]),
     ];
     for (field, bytes) in cases {
         let offset = field.start as u16;

@@ -7,8 +7,8 @@
 use firmware::droop::Droop;
 use firmware::grid::{Cell, Grid, GridError};
 use firmware::table::{
-    CRC_LEN, HEADER_LEN, Header, InputsKind, LAWS, LawEntry, PlantParameters, WriteError,
-    bits_per_entry, field, seal, write_header,
+    CRC_LEN, HEADER_LEN, Header, Hypotheses, InputsKind, LAWS, LawEntry, PlantParameters,
+    WriteError, bits_per_entry, field, seal, write_header,
 };
 use firmware::units::{Band, STATES};
 use synth::delay::Delay;
@@ -40,6 +40,7 @@ fn header(stay: bool) -> Result<Header, GridError> {
         input_step_ppm: 50_000,
         levels: LEVELS,
         stay,
+        always_on: false,
         tick_ms: 100,
         period_ticks: 15,
         delay_ticks: 0,
@@ -53,6 +54,7 @@ fn header(stay: bool) -> Result<Header, GridError> {
         },
         droop: Droop::PAPER,
         plant: PlantParameters::PAPER,
+        hypotheses: Hypotheses::PAPER,
         laws: [None; LAWS],
     })
 }

@@ -110,7 +110,7 @@ fn falls(ticks: &[Tick], most_ppm: u32) {
 #[test]
 fn reserves_replace_the_loss_and_charging_resumes() {
     let loss = |s: f64| (2.0 * (1.0 - (s - 200.0) / 300.0)).clamp(0.0, 2.0);
-    for table in ["paper-bi.bin", "gb-bi.bin"] {
+    for table in ["paper-bi.bin", "gb-bi-band.bin"] {
         let ticks = run(table, 1800.0, loss);
         let at = first_release(&ticks);
         let after = &ticks[at..];
@@ -127,7 +127,7 @@ fn reserves_replace_the_loss_and_charging_resumes() {
 #[test]
 fn a_generator_that_comes_back_at_once_does_not_make_the_fleet_hunt() {
     let loss = |s: f64| if s < 200.0 { 2.0 } else { 0.0 };
-    for table in ["paper-bi.bin", "gb-bi.bin"] {
+    for table in ["paper-bi.bin", "gb-bi-band.bin"] {
         let ticks = run(table, 1800.0, loss);
         let at = first_release(&ticks);
         falls(&ticks[at..], 1_670);
@@ -140,7 +140,7 @@ fn a_generator_that_comes_back_at_once_does_not_make_the_fleet_hunt() {
 /// Hold gives no more than it must, so f stays below 49.9 Hz and the event lasts: the proof's "for ever" is not cut short.
 #[test]
 fn an_event_whose_loss_nobody_replaces_does_not_end() {
-    let ticks = run("gb-bi.bin", 3600.0, |_| 2.0);
+    let ticks = run("gb-bi-band.bin", 3600.0, |_| 2.0);
     assert!(ticks.iter().all(|tick| tick.mode == Mode::Table));
     assert!(ticks.last().unwrap().share_ppm > 0);
 }
@@ -172,7 +172,7 @@ fn the_next_loss_during_a_release_is_answered() {
         s if s < 400.0 => 0.0,
         _ => 2.0,
     };
-    for table in ["paper-bi.bin", "gb-bi.bin"] {
+    for table in ["paper-bi.bin", "gb-bi-band.bin"] {
         let ticks = run(table, 520.0, loss);
         let second = ticks.iter().filter(|tick| tick.s >= 400.0);
         let below = second

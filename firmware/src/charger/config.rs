@@ -2,6 +2,7 @@
 
 use crate::event::EventEnd;
 use crate::frequency::gate::GateLimits;
+use crate::response::LevelOffset;
 use crate::table::PlantParameters;
 use crate::wide::divide;
 
@@ -34,21 +35,26 @@ pub struct ChargerConfig {
     pub hold_ticks: u16,
     /// Release of the participation per tick once frequency is lost \[ppm\].
     pub release_ppm: u32,
-    /// Ticks of warm-up; `None` takes [`trust_ticks`], or the table's delay if that is longer.
+    /// Ticks of warm-up; `None` takes [`trust_ticks`], or the table's delay if that is longer. A
+    /// response needs none.
     pub warm_up_ticks: Option<u16>,
+    /// By how much this charger's levels of a response are shifted: of its serial number, so that a
+    /// fleet does not step together.
+    pub level_offset: LevelOffset,
     /// When an event is over, and how long the way back takes.
     pub event_end: EventEnd,
 }
 
 impl ChargerConfig {
-    /// No filter, 1 s of hold at 100 ms a tick, release over 60 s, warm-up by the plant,
-    /// [`EventEnd::DEFAULT`].
+    /// No filter, 1 s of hold at 100 ms a tick, release over 60 s, warm-up by the plant, levels as
+    /// they are, [`EventEnd::DEFAULT`].
     pub const DEFAULT: Self = Self {
         gate: GateLimits::DEFAULT,
         filter_ticks: 1,
         hold_ticks: 10,
         release_ppm: 1_667,
         warm_up_ticks: None,
+        level_offset: LevelOffset::NONE,
         event_end: EventEnd::DEFAULT,
     };
 }

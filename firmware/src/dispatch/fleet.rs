@@ -7,18 +7,22 @@
 
 use crate::units::MICRO;
 
+/// A serial number's place in the fleet, in units of 2^-32: multiples of the golden ratio modulo 1.
+/// Any run of N consecutive numbers is spread so evenly that its share below any level is within
+/// about `log N / N` of that level.
+pub(crate) const fn spread(serial: u32) -> u32 {
+    // 2^32 / golden ratio, odd.
+    serial.wrapping_mul(0x9E37_79B9)
+}
+
 /// A charger's threshold in [0, 1), in parts per million.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Threshold(u32);
 
 impl Threshold {
-    /// The threshold of a serial number: multiples of the golden ratio modulo 1. Any run of N
-    /// consecutive serial numbers is spread so evenly that its share below any level is within
-    /// about `log N / N` of that level.
+    /// The threshold of a serial number; consecutive ones are spread evenly.
     pub const fn of_serial(serial: u32) -> Self {
-        // 2^32 / golden ratio, odd.
-        let spread = serial.wrapping_mul(0x9E37_79B9);
-        Self(((spread as u64 * MICRO as u64) >> 32) as u32)
+        Self(((spread(serial) as u64 * MICRO as u64) >> 32) as u32)
     }
 
     /// A threshold in ppm; 1 000 000 and more become the highest.

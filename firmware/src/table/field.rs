@@ -29,7 +29,7 @@ pub const COUNT: Field = 60..68;
 pub const INPUT_STEP: Field = 68..72;
 /// Input levels, u8.
 pub const LEVELS: Field = 72..73;
-/// Flags, u8; bit 0 is `stay`.
+/// Flags, u8; bit 0 is `stay`, bit 1 `always on`, bit 2 `own clocks`.
 pub const FLAGS: Field = 73..74;
 /// Tick, u16 \[ms\].
 pub const TICK: Field = 74..76;
@@ -61,11 +61,43 @@ pub const DAMPING: Field = 124..128;
 pub const INERTIA: Field = 128..132;
 /// Fleet power, u32 \[kW\].
 pub const FLEET: Field = 132..136;
+/// Hypothesis: bound on the estimate's error, f g l p, u32 \[µHz, kW\].
+pub const ESTIMATE_ERROR: Field = 136..152;
+/// Hypothesis: age of what the meter reads, least, most, u16 \[ms\].
+pub const METER_LAG: Field = 152..156;
+/// Hypothesis: time from a command to its power, least, most, u16 \[ms\].
+pub const ACTUATION_DELAY: Field = 156..160;
+/// Hypothesis: relative error of the participation, u32 \[ppm\].
+pub const PARTICIPATION_RELATIVE: Field = 160..164;
+/// Hypothesis: absolute error of the participation, u32 \[ppm\].
+pub const PARTICIPATION_ABSOLUTE: Field = 164..168;
+/// Hypothesis: lost power, low, high, i32 \[kW\].
+pub const LOSS: Field = 168..176;
+/// Hypothesis: how the loss moves, u8.
+pub const LOSS_PROFILE: Field = 176..177;
+/// Hypothesis: which way power can move, u8.
+pub const DIRECTION: Field = 177..178;
+/// Hypothesis: longest time between decisions, u16 \[ms\].
+pub const TICK_MOST: Field = 178..180;
+/// Hypothesis: H, low, high, u32 \[kW s/Hz\].
+pub const INERTIA_BAND: Field = 180..188;
+/// Hypothesis: 1/R_eq, low, high, i32 \[kW/Hz\].
+pub const GOVERNOR_GAIN_BAND: Field = 188..196;
+/// Hypothesis: D, low, high, u32 \[kW/Hz\].
+pub const DAMPING_BAND: Field = 196..204;
+/// Hypothesis: power of one charger, u32 \[W\].
+pub const POWER_PER_CHARGER: Field = 204..208;
+/// Hypothesis: chargers of the fleet, u32.
+pub const CHARGERS: Field = 208..212;
+/// Version of the table, u32.
+pub const TABLE_VERSION: Field = 212..216;
+/// Version of the generator, u32.
+pub const GENERATOR: Field = 216..220;
 /// The directory: an entry for C1, C2 and Hold each.
-pub const DIRECTORY: Field = 136..172;
+pub const DIRECTORY: Field = 220..256;
 
 /// All fields, in the order in which they stand.
-pub const ALL: [Field; 27] = [
+pub const ALL: [Field; 43] = [
     MAGIC,
     BYTE_ORDER,
     VERSION,
@@ -92,6 +124,22 @@ pub const ALL: [Field; 27] = [
     DAMPING,
     INERTIA,
     FLEET,
+    ESTIMATE_ERROR,
+    METER_LAG,
+    ACTUATION_DELAY,
+    PARTICIPATION_RELATIVE,
+    PARTICIPATION_ABSOLUTE,
+    LOSS,
+    LOSS_PROFILE,
+    DIRECTION,
+    TICK_MOST,
+    INERTIA_BAND,
+    GOVERNOR_GAIN_BAND,
+    DAMPING_BAND,
+    POWER_PER_CHARGER,
+    CHARGERS,
+    TABLE_VERSION,
+    GENERATOR,
     DIRECTORY,
 ];
 
@@ -109,4 +157,26 @@ pub mod entry {
     pub const DOMAIN_LEN: Field = 4..8;
     /// Bytes of the inputs part, u32.
     pub const INPUTS_LEN: Field = 8..12;
+}
+
+/// Where the parameters of a response part stand, in bytes from the start of the part.
+pub mod response {
+    use super::Field;
+
+    /// Droop gain, u32 \[ppm/Hz\].
+    pub const DROOP_GAIN: Field = 0..4;
+    /// Set-point, i32 \[µHz\].
+    pub const SETPOINT: Field = 4..8;
+    /// Slope gain, u32 \[ppm s/Hz\].
+    pub const SLOPE_GAIN: Field = 8..12;
+    /// Slope threshold, u32 \[µHz/s\].
+    pub const SLOPE_THRESHOLD: Field = 12..16;
+    /// Window of the slope, u32 \[ticks\].
+    pub const WINDOW: Field = 16..20;
+    /// Largest slope response, u32 \[ppm\].
+    pub const SLOPE_MOST: Field = 20..24;
+    /// Release of the slope response in a tick, u32 \[ppm\].
+    pub const RELEASE: Field = 24..28;
+    /// Smallest change of a command, u32 \[ppm\].
+    pub const SMALLEST_CHANGE: Field = 28..32;
 }

@@ -2,6 +2,7 @@
 //!
 //! Where each field stands is in [`super::field`]; reader and writer are in `header_bytes`.
 
+use super::hypotheses::Hypotheses;
 use crate::droop::Droop;
 use crate::grid::Grid;
 use crate::units::{Band, Participation};
@@ -12,6 +13,8 @@ pub const SPEC_HASH_LEN: usize = 16;
 pub const LAWS: usize = 3;
 /// Most input levels a table may have.
 pub const LEVELS_MAX: u8 = 32;
+/// Longest tick \[ms\]: half of the shortest time after which a board's watchdog bites.
+pub const TICK_MS_MAX: u16 = 200;
 
 /// A law of the table, in the order of the directory.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -102,7 +105,9 @@ pub struct Header {
     pub levels: u8,
     /// Whether Hold follows C1 and C2 (otherwise Fixed).
     pub stay: bool,
-    /// Length of a tick, `sampling.watch_s` \[ms\].
+    /// Whether the table is a response: a law that is always on, in place of C1, C2 and Hold.
+    pub always_on: bool,
+    /// Length of a tick, `sampling.watch_s` \[ms\], at most [`TICK_MS_MAX`].
     pub tick_ms: u16,
     /// Ticks for which C1, C2 and Hold hold a decision; not zero.
     pub period_ticks: u16,
@@ -116,6 +121,8 @@ pub struct Header {
     pub droop: Droop,
     /// The plant, for the observer.
     pub plant: PlantParameters,
+    /// What the proof assumed.
+    pub hypotheses: Hypotheses,
     /// The directory, indexed by [`Law`].
     pub laws: [Option<LawEntry>; LAWS],
 }

@@ -6,7 +6,9 @@ use super::TableError;
 use super::bytes::{array_at, byte_at, i32_at, u16_at, u32_at};
 use super::checksum;
 use super::field::{self, Field, entry};
-use super::header::{Header, LAWS, LEVELS_MAX, LawEntry, PlantParameters};
+use super::header::{Header, LAWS, LEVELS_MAX, LawEntry, PlantParameters, TICK_MS_MAX};
+use super::hypotheses::Hypotheses;
+use super::response_part::RESPONSE_LEN;
 use crate::droop::Droop;
 use crate::grid::Grid;
 use crate::prediction::{DELAY_TICKS_MAX, LEVELS_KEPT, prediction_len};
@@ -17,7 +19,7 @@ pub const MAGIC: [u8; 4] = *b"HFDT";
 /// Byte-order mark as a little-endian reader must find it.
 pub const BYTE_ORDER_MARK: u16 = 0xFEFF;
 /// The version of the format that this module reads and writes.
-pub const FORMAT_VERSION: u16 = 2;
+pub const FORMAT_VERSION: u16 = 3;
 /// Bytes of the header, directory included.
 pub const HEADER_LEN: usize = field::DIRECTORY.end;
 /// Bytes of a directory entry.
@@ -27,6 +29,12 @@ pub const CRC_LEN: usize = 4;
 
 /// Flag: Hold follows C1 and C2.
 const FLAG_STAY: u8 = 1;
+/// Flag: the table is a response.
+const FLAG_ALWAYS_ON: u8 = 2;
+/// Flag: each charger decides at moments of its own.
+const FLAG_OWN_CLOCKS: u8 = 4;
+/// All flags.
+const FLAGS: u8 = FLAG_STAY | FLAG_ALWAYS_ON | FLAG_OWN_CLOCKS;
 /// Kind in the directory of a law that the table does not hold.
 const ABSENT: u8 = 255;
 
@@ -105,16 +113,19 @@ impl Header {
         let full = u64::from(input_step_ppm) * u64::from(levels - 1);
         check(full <= MICRO as u64, &field::INPUT_STEP)?;
         let flags = byte_at(bytes, field::FLAGS.start);
-        check(flags & !FLAG_STAY == 0, &field::FLAGS)?;
+        check(flags & !FLAGS == 0, &field::FLAGS)?;
+        let always_on = flags & FLAG_ALWAYS_ON != 0;
         let tick_ms = u16_at(bytes, field::TICK.start);
-        check(tick_ms > 0, &field::TICK)?;
+        check((1..=TICK_MS_MAX).contains(&tick_ms), &field::TICK)?;
         let period_ticks = u16_at(bytes, field::PERIOD.start);
         check(period_ticks > 0, &field::PERIOD)?;
         let delay_ticks = u16_at(bytes, field::DELAY.start);
-        // The prediction part lies between header and blocks.
+        // The prediction part lies between header and blocks. A response predicts nothing.
         let least = HEADER_LEN + prediction_len(delay_ticks) + CRC_LEN;
         let has_room = delay_ticks <= DELAY_TICKS_MAX && bytes.len() >= least;
-        check(has_room, &field::DELAY)?;
+        check(has_room && !(always_on && delay_ticks > 0), &field::DELAY)?;
+        let response_len = if always_on { RESPONSE_LEN } else { 0 };
+        check(bytes.len() >= least + response_len, &field::FLAGS)?;
         let outer = read_band(bytes, &field::OUTER);
         let inner = read_band(bytes, &field::INNER);
         check(outer.low_uhz < outer.high_uhz, &field::OUTER)?;
@@ -126,9 +137,13 @@ impl Header {
         };
         check(droop.full_uhz > 0, &field::DROOP_FULL)?;
         let plant = read_plant(bytes)?;
+        let hypotheses = Hypotheses::read(bytes, tick_ms, flags & FLAG_OWN_CLOCKS != 0)?;
         let mut laws = [None; LAWS];
         for (index, law) in laws.iter_mut().enumerate() {
             *law = read_entry(bytes, entry_at(index))?;
+            // A table is by games or a response, not both.
+            let at = entry_at(index);
+            check(!always_on || law.is_none(), &(at..at + DIRECTORY_ENTRY_LEN))?;
         }
         Ok(Self {
             spec_hash: array_at(bytes, field::SPEC_HASH.start).unwrap_or_default(),
@@ -136,6 +151,7 @@ impl Header {
             input_step_ppm,
             levels,
             stay: flags & FLAG_STAY != 0,
+            always_on,
             tick_ms,
             period_ticks,
             delay_ticks,
@@ -143,6 +159,7 @@ impl Header {
             inner,
             droop,
             plant,
+            hypotheses,
             laws,
         })
     }
@@ -241,7 +258,11 @@ pub fn write_header(header: &Header) -> [u8; HEADER_LEN] {
     put(field::COUNT, count.as_flattened());
     put(field::INPUT_STEP, &header.input_step_ppm.to_le_bytes());
     put(field::LEVELS, &[header.levels]);
-    put(field::FLAGS, &[if header.stay { FLAG_STAY } else { 0 }]);
+    let flag = |on: bool, bit: u8| if on { bit } else { 0 };
+    let flags = flag(header.stay, FLAG_STAY)
+        | flag(header.always_on, FLAG_ALWAYS_ON)
+        | flag(header.hypotheses.own_clocks, FLAG_OWN_CLOCKS);
+    put(field::FLAGS, &[flags]);
     put(field::TICK, &header.tick_ms.to_le_bytes());
     put(field::PERIOD, &header.period_ticks.to_le_bytes());
     put(field::DELAY, &header.delay_ticks.to_le_bytes());
@@ -261,6 +282,7 @@ pub fn write_header(header: &Header) -> [u8; HEADER_LEN] {
     put(field::DAMPING, &plant.damping_kw_per_hz.to_le_bytes());
     put(field::INERTIA, &plant.inertia_kw_s_per_hz.to_le_bytes());
     put(field::FLEET, &plant.fleet_kw.to_le_bytes());
+    header.hypotheses.write(&mut put);
     let entries = header.laws.map(|law| write_entry(law.as_ref()));
     put(field::DIRECTORY, entries.as_flattened());
     out

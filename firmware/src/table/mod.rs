@@ -1,5 +1,5 @@
 //! The flash image: a header, the coefficients of the prediction if commands act with a delay, one
-//! block per law, a CRC.
+//! block per law or the parameters of a response, a CRC.
 //!
 //! Reader ([`TableView`]) and writer ([`write`]) of the format live here, so that they cannot drift
 //! apart; `docs/table-format.md` gives the same bytes in prose. All integers are little-endian.
@@ -15,8 +15,10 @@ mod domain;
 pub mod field;
 mod header;
 mod header_bytes;
+mod hypotheses;
 mod law;
 mod look_ahead;
+mod response_part;
 mod tree;
 mod tree_node;
 
@@ -26,18 +28,24 @@ pub use domain::{
     DomainKind, HALF_SPACES_MAX, LEAF_HALF_SPACE, LEAF_HULL, LEAF_INSIDE, LEAF_LOOK_AHEAD,
     LEAF_OUTSIDE, LOOK_AHEADS_MAX,
 };
-pub use header::{Header, LAWS, LEVELS_MAX, Law, LawEntry, PlantParameters, SPEC_HASH_LEN};
+pub use header::{
+    Header, LAWS, LEVELS_MAX, Law, LawEntry, PlantParameters, SPEC_HASH_LEN, TICK_MS_MAX,
+};
 pub use header_bytes::{
     BYTE_ORDER_MARK, CRC_LEN, DIRECTORY_ENTRY_LEN, FORMAT_VERSION, HEADER_LEN, MAGIC, WriteError,
     seal, write_header,
 };
+pub use hypotheses::{Direction, Hypotheses, LossProfile};
 pub use law::{Encoding, InputsKind, LawView};
 pub use look_ahead::{LOOK_AHEAD_LEN, LOOK_AHEAD_SHIFT_MAX, LOOK_AHEAD_STEPS_MAX, LookAhead};
+pub use response_part::{RESPONSE_LEN, write_response};
 pub use tree::{AFFINE_PIECES_MAX, LEAF_AFFINE, TREE_DEPTH_MAX, TreeView};
 pub use tree_node::{Children, LEAF_VALUES, NODE_LEN_MAX, Node, SKIP_MAX};
 
 use crate::grid::{Cell, GridError};
 use crate::prediction::{PredictionView, prediction_len};
+use crate::response::ResponseLaw;
+use response_part::read_response;
 
 /// CRC-32 as in Ethernet and zip (polynomial 0x04C11DB7 reflected).
 const CRC: crc::Crc<u32, crc::NoTable> = crc::Crc::<u32, crc::NoTable>::new(&crc::CRC_32_ISO_HDLC);
@@ -151,6 +159,7 @@ pub enum BlockError {
 pub struct TableView<'t> {
     header: Header,
     laws: [Option<LawView<'t>>; LAWS],
+    response: Option<ResponseLaw>,
     bytes: &'t [u8],
 }
 
@@ -164,6 +173,11 @@ impl<'t> TableView<'t> {
         let mut laws = [None, None, None];
         // The header has been held against the image's length.
         let mut at = HEADER_LEN + prediction_len(header.delay_ticks);
+        let mut response = None;
+        if header.always_on {
+            response = Some(read_response(bytes, at)?);
+            at += RESPONSE_LEN;
+        }
         for law in Law::ALL {
             let entry = header.laws[law as usize];
             let Some(entry) = entry else { continue };
@@ -191,6 +205,7 @@ impl<'t> TableView<'t> {
         Ok(Self {
             header,
             laws,
+            response,
             bytes,
         })
     }
@@ -223,6 +238,11 @@ impl<'t> TableView<'t> {
         let len = prediction_len(self.header.delay_ticks);
         let part = self.bytes.get(HEADER_LEN..HEADER_LEN + len)?;
         (!part.is_empty()).then(|| PredictionView::new(part))
+    }
+
+    /// The law that is always on, if the table is a response.
+    pub fn response(&self) -> Option<&ResponseLaw> {
+        self.response.as_ref()
     }
 
     /// The whole image.

@@ -7,6 +7,7 @@
 //! | [`plant`] | parameters | the equations, once, for plain numbers and intervals |
 //! | [`propagator`] | the equations | the exact step in plain numbers |
 //! | [`interval`], [`flow`] | the equations | enclosures of the flow over a time |
+//! | [`table_fields`] | a spec | plant, droop, hypotheses and response in a table's whole numbers |
 //! | [`grid_shape`] | a grid of cells | cell numbers |
 //! | [`budget`] | a table | bytes, visits and flash left, as data |
 //! | [`verdict`] | a proof or its failure | what commands and report show |
@@ -20,4 +21,5 @@ pub mod logic;
 pub mod plant;
 pub mod propagator;
 pub mod spec;
+pub mod table_fields;
 pub mod verdict;

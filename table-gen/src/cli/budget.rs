@@ -9,6 +9,7 @@ use model::budget::Budget;
 use model::spec::Spec;
 use synth::budget::{self, sweep};
 use synth::compress::{self, Options};
+use synth::pipeline;
 use synth::synthesis;
 
 /// Arguments of `budget`.
@@ -71,10 +72,14 @@ pub(super) fn run(args: &BudgetArgs) -> Result<(), Failure> {
             .map_err(|error| Failure::BadInput(format!("{}: {error}", path.display())))?
     } else {
         let spec = args.overrides.load(&args.subject)?;
-        let synthesis = synthesis::synthesise(&spec, &progress::watch)?;
-        compress::table(&spec, &synthesis, &options, &progress::watch)
-            .map_err(|error| Failure::No(error.to_string()))?
-            .0
+        if spec.preference.always_on {
+            pipeline::response(&spec)?
+        } else {
+            let synthesis = synthesis::synthesise(&spec, &progress::watch)?;
+            compress::table(&spec, &synthesis, &options, &progress::watch)
+                .map_err(|error| Failure::No(error.to_string()))?
+                .0
+        }
     };
     let table = TableView::parse(&bytes)
         .map_err(|error| Failure::BadInput(format!("{}: {error:?}", args.subject)))?;

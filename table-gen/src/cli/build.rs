@@ -3,7 +3,10 @@
 use std::path::PathBuf;
 
 use clap::ValueEnum;
-use firmware::table::{DENSE_HEADER_LEN, Header, InputsKind, Law, TableView, bits_per_entry};
+use firmware::phase::Phase;
+use firmware::table::{
+    DENSE_HEADER_LEN, Header, InputsKind, Law, RESPONSE_LEN, TableView, bits_per_entry,
+};
 use serde::Serialize;
 
 use super::files::write_all;
@@ -17,7 +20,7 @@ use lab::simulation::trajectory::PhaseSpan;
 use model::verdict::ClaimName;
 use synth::budget;
 use synth::compress::{LawReport, Options, VISITS_GOAL};
-use synth::pipeline::{self, Encoding};
+use synth::pipeline::{self, Emitted, Encoding};
 use synth::synthesis;
 
 /// Arguments of `build`.
@@ -99,9 +102,17 @@ struct BuildReport<'r> {
 pub(super) fn run(args: &BuildArgs) -> Result<(), Failure> {
     let spec = args.spec.load()?;
     progress::catch_interrupts();
-    let synthesis = synthesis::synthesise(&spec, &progress::watch)?;
-    let synth = SynthReport::new(&spec, &synthesis);
-    let emitted = pipeline::emit(&spec, &synthesis, args.encoding(), &progress::watch)?;
+    let (synth, emitted) = if spec.preference.always_on {
+        let emitted = Emitted {
+            bytes: pipeline::response(&spec)?,
+            laws: Vec::new(),
+        };
+        (SynthReport::of_response(&spec), emitted)
+    } else {
+        let synthesis = synthesis::synthesise(&spec, &progress::watch)?;
+        let emitted = pipeline::emit(&spec, &synthesis, args.encoding(), &progress::watch)?;
+        (SynthReport::new(&spec, &synthesis), emitted)
+    };
     let bytes = emitted.bytes;
     let table =
         TableView::parse(&bytes).map_err(|error| Failure::BadInput(format!("{error:?}")))?;
@@ -162,6 +173,21 @@ pub(super) fn run(args: &BuildArgs) -> Result<(), Failure> {
 }
 
 fn encodings(table: &TableView<'_>, reports: &[(Law, LawReport)]) -> Vec<EncodingReport> {
+    if table.response().is_some() {
+        return vec![EncodingReport {
+            phase: Phase::Response.name(),
+            encoding: "parameters",
+            bytes: RESPONSE_LEN as u32,
+            domain_bytes: 0,
+            inputs_bytes: RESPONSE_LEN as u32,
+            entries: 0,
+            worst_visits: 0,
+            dense_bytes: 0,
+            domain_cells: None,
+            worst_steps: None,
+            worst_steps_minimal: None,
+        }];
+    }
     let laws = [(Law::C1, "C1"), (Law::C2, "C2"), (Law::Hold, "Hold")];
     laws.into_iter()
         .filter_map(|(law, phase)| {

@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use firmware::grid::Cell;
+use firmware::response::ResponseLaw;
 use firmware::table::{Law, TableView};
 use serde::Serialize;
 
@@ -44,6 +45,37 @@ struct InspectReport {
     tick_ms: u16,
     stay: bool,
     laws: Vec<LawSurvey>,
+    /// The law that is always on, in a table that is a response.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    response: Option<ResponseReport>,
+}
+
+/// The parameters of a response, in the table's whole numbers.
+#[derive(Debug, Serialize)]
+struct ResponseReport {
+    droop_gain_ppm_per_hz: u32,
+    setpoint_uhz: i32,
+    slope_gain_ppm_s_per_hz: u32,
+    slope_threshold_uhz_per_s: u32,
+    window_ticks: u16,
+    slope_most_ppm: u32,
+    release_ppm: u32,
+    smallest_change_ppm: u32,
+}
+
+impl From<&ResponseLaw> for ResponseReport {
+    fn from(law: &ResponseLaw) -> Self {
+        Self {
+            droop_gain_ppm_per_hz: law.droop_gain_ppm_per_hz,
+            setpoint_uhz: law.setpoint_uhz,
+            slope_gain_ppm_s_per_hz: law.slope_gain_ppm_s_per_hz,
+            slope_threshold_uhz_per_s: law.slope_threshold_uhz_per_s,
+            window_ticks: law.window_ticks,
+            slope_most_ppm: law.slope_most_ppm,
+            release_ppm: law.release_ppm,
+            smallest_change_ppm: law.smallest_change_ppm,
+        }
+    }
 }
 
 /// Runs the command.
@@ -69,6 +101,7 @@ pub(super) fn run(args: &InspectArgs) -> Result<(), Failure> {
             .into_iter()
             .filter_map(|law| inspect::survey(&table, law))
             .collect(),
+        response: table.response().map(ResponseReport::from),
     };
     if args.output.json {
         output::json(&report)?;
@@ -105,6 +138,31 @@ fn print(report: &InspectReport) {
         report.tick_ms,
         if report.stay { ", stays in I2" } else { "" }
     ));
+    if let Some(law) = &report.response {
+        let mut table = output::table(&["response", "value", "unit"]);
+        for (name, value, unit) in [
+            ("droop gain", i64::from(law.droop_gain_ppm_per_hz), "ppm/Hz"),
+            ("set-point", i64::from(law.setpoint_uhz), "µHz"),
+            (
+                "slope gain",
+                i64::from(law.slope_gain_ppm_s_per_hz),
+                "ppm s/Hz",
+            ),
+            (
+                "slope threshold",
+                i64::from(law.slope_threshold_uhz_per_s),
+                "µHz/s",
+            ),
+            ("window", i64::from(law.window_ticks), "ticks"),
+            ("slope response, most", i64::from(law.slope_most_ppm), "ppm"),
+            ("release", i64::from(law.release_ppm), "ppm/tick"),
+            ("smallest change", i64::from(law.smallest_change_ppm), "ppm"),
+        ] {
+            table.add_row(vec![name.to_owned(), value.to_string(), unit.to_owned()]);
+        }
+        output::line(table);
+        return;
+    }
     let mut table = output::table(&[
         "law",
         "cells",

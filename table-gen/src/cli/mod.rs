@@ -151,7 +151,7 @@ impl From<::synth::synthesis::SynthesisError> for Failure {
         use ::synth::game::GameError;
         use ::synth::synthesis::SynthesisError as E;
         match &error {
-            E::Delay { .. } | E::Grid(_) | E::Abstraction(_) => Self::bad(error),
+            E::Delay { .. } | E::Grid(_) | E::Abstraction(_) | E::Response => Self::bad(error),
             E::Game {
                 error: GameError::EmptyTarget,
                 ..

@@ -35,6 +35,8 @@ pub(super) struct ProblemReport {
 #[derive(Debug, Clone, Serialize)]
 pub(super) struct SynthReport {
     spec: String,
+    /// Whether the law is always on, so that no game is played.
+    response: bool,
     cells: u32,
     inputs: usize,
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -45,6 +47,20 @@ pub(super) struct SynthReport {
 }
 
 impl SynthReport {
+    /// The report of a spec whose preferred law is always on: no game is played.
+    pub(super) fn of_response(spec: &Spec) -> Self {
+        Self {
+            spec: spec.name.clone(),
+            response: true,
+            cells: 0,
+            inputs: 0,
+            transitions: None,
+            abstraction_cpu_s: 0.0,
+            problems: Vec::new(),
+            peak_rss_mb: usage::peak_rss_mb(),
+        }
+    }
+
     /// The report of a synthesis.
     pub(super) fn new(spec: &Spec, synthesis: &Synthesis) -> Self {
         let laws = [
@@ -54,6 +70,7 @@ impl SynthReport {
         ];
         Self {
             spec: spec.name.clone(),
+            response: false,
             cells: synthesis.grid.cells(),
             inputs: spec.input.levels(),
             transitions: None,
@@ -68,6 +85,13 @@ impl SynthReport {
 
     /// The same as a table on stdout.
     pub(super) fn print(&self) {
+        if self.response {
+            output::line(format_args!(
+                "{}: a response, always on: no game is played",
+                self.spec
+            ));
+            return;
+        }
         output::line(format_args!(
             "{}: {} cells, {} inputs",
             self.spec,
@@ -125,6 +149,14 @@ fn problem(name: &'static str, law: &SolvedLaw) -> ProblemReport {
 pub(super) fn run(args: &SynthArgs) -> Result<(), Failure> {
     let spec = args.spec.load()?;
     progress::catch_interrupts();
+    if spec.preference.always_on {
+        let report = SynthReport::of_response(&spec);
+        if args.output.json {
+            return output::json(&report);
+        }
+        report.print();
+        return Ok(());
+    }
     let synthesis = synthesis::synthesise(&spec, &progress::watch)?;
     let mut report = SynthReport::new(&spec, &synthesis);
     if args.count_transitions {

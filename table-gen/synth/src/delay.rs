@@ -106,7 +106,8 @@ pub struct DelayError;
 
 /// Length of the delay \[ticks of `sampling.watch_s`\].
 pub fn ticks(spec: &Spec) -> u32 {
-    spec.sampling.ticks_of(spec.uncertainty.actuation_delay_s)
+    spec.sampling
+        .ticks_of(spec.uncertainty.actuation_delay_s.most_s())
 }
 
 /// Bound of the error of what the games know \[micro-units\]: the estimate's, or, with a delay, the prediction's (E').

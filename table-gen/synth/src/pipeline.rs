@@ -122,6 +122,15 @@ pub fn emit<'w>(
     })
 }
 
+/// The table of a spec whose preferred law is always on. No game is played.
+///
+/// # Errors
+/// A spec whose laws come from games, or numbers that do not fit the format.
+pub fn response(spec: &Spec) -> Result<Vec<u8>, PipelineError> {
+    let grid = synthesis::device_grid(spec).map_err(SynthesisError::Grid)?;
+    Ok(emit::response(spec, grid)?)
+}
+
 /// A table for a spec: from a file, which must have been made for it, or synthesised.
 ///
 /// # Errors
@@ -132,6 +141,9 @@ pub fn table_bytes<'w>(
     watch: &dyn Fn(&'static str) -> Box<dyn Watch + 'w>,
 ) -> Result<Vec<u8>, PipelineError> {
     let Some(path) = file else {
+        if spec.preference.always_on {
+            return response(spec);
+        }
         let synthesis = synthesis::synthesise(spec, watch)?;
         return Ok(emit(spec, &synthesis, Encoding::default(), watch)?.bytes);
     };

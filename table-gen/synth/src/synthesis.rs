@@ -68,6 +68,9 @@ pub enum SynthesisError {
     /// A delay that the device cannot predict over.
     #[error(transparent)]
     Delay(#[from] DelayError),
+    /// The preferred law is always on: no game is played.
+    #[error("preference.always_on is true: the law itself is the table, and no game is played")]
+    Response,
     /// The spec's grid is not one for the device.
     #[error("the grid does not fit the device: {0:?}")]
     Grid(GridError),
@@ -278,6 +281,9 @@ pub fn synthesise<'w>(
     spec: &Spec,
     watch: &dyn Fn(&'static str) -> Box<dyn Watch + 'w>,
 ) -> Result<Synthesis, SynthesisError> {
+    if spec.preference.always_on {
+        return Err(SynthesisError::Response);
+    }
     let grid = device_grid(spec).map_err(SynthesisError::Grid)?;
     let before = usage::cpu_s();
     let abstraction = abstraction(spec, &grid)?;

@@ -103,7 +103,9 @@ impl Model {
             period_ticks,
         };
         // What the grid does is the spec's, whatever the table predicts.
-        let late = spec.sampling.ticks_of(spec.uncertainty.actuation_delay_s);
+        let late = spec
+            .sampling
+            .ticks_of(spec.uncertainty.actuation_delay_s.most_s());
         if late > 0 {
             let expected: Vec<Interval> = commands.map(|ppm| expected_power(spec, ppm)).collect();
             model.knowledge = Knowledge::of_prediction(table, &model, &expected, late);

@@ -4,12 +4,68 @@
 //! that this spec asks for: another grid, clock, band or plant means a table for another purpose, even where it happens
 //! to meet the requirements.
 
-use firmware::table::Header;
+use firmware::observer::ObserverConfig;
+use firmware::table::{Header, TableView};
 
+use super::hex;
 use model::spec::Spec;
+use model::table_fields::{self, FieldError};
 
-/// The header's fields that differ from the spec; empty if they agree.
-pub(super) fn differences(header: &Header, spec: &Spec) -> Vec<String> {
+/// The header's fields that differ from the spec, and why the device cannot use it; empty if all is
+/// well.
+pub(super) fn differences(table: &TableView<'_>, spec: &Spec) -> Vec<String> {
+    let header = table.header();
+    let mut out = geometry(header, spec);
+    if let Err(error) = numbers(table, spec, &mut out) {
+        out.push(error.to_string());
+    }
+    // The device runs the droop where its observer cannot follow the plant.
+    if !header.always_on
+        && let Err(error) = ObserverConfig::new(&header.plant, header.tick_ms)
+    {
+        out.push(format!("the device refuses the plant: {error:?}"));
+    }
+    out
+}
+
+/// Droop, plant, hypotheses, response and identity. The generator's version is no part of the proof,
+/// and any will do.
+fn numbers(table: &TableView<'_>, spec: &Spec, out: &mut Vec<String>) -> Result<(), FieldError> {
+    let header = table.header();
+    let mut same = |what: &str, found: String, expected: String| {
+        if found != expected {
+            out.push(format!("{what} is {found}, the spec says {expected}"));
+        }
+    };
+    same("the spec's hash", hex(&header.spec_hash), hex(&spec.hash()));
+    same(
+        "the droop",
+        format!("{:?}", header.droop),
+        format!("{:?}", table_fields::droop(spec)?),
+    );
+    same(
+        "the plant",
+        format!("{:?}", header.plant),
+        format!("{:?}", table_fields::plant(spec)?),
+    );
+    let expected = table_fields::hypotheses(spec)?;
+    let mut found = header.hypotheses;
+    found.generator = expected.generator;
+    same(
+        "what was assumed",
+        format!("{found:?}"),
+        format!("{expected:?}"),
+    );
+    same(
+        "the response",
+        format!("{:?}", table.response()),
+        format!("{:?}", table_fields::response(spec)?.as_ref()),
+    );
+    Ok(())
+}
+
+/// Grid, inputs, clocks and bands.
+fn geometry(header: &Header, spec: &Spec) -> Vec<String> {
     let mut out = Vec::new();
     let mut same = |what: &str, found: String, expected: String| {
         if found != expected {
@@ -60,12 +116,17 @@ pub(super) fn differences(header: &Header, spec: &Spec) -> Vec<String> {
         header.period_ticks.to_string(),
         ticks.to_string(),
     );
+    // A response predicts nothing; its delay is among what was assumed.
+    let late = if spec.preference.always_on {
+        0
+    } else {
+        spec.sampling
+            .ticks_of(spec.uncertainty.actuation_delay_s.most_s())
+    };
     same(
         "the delay [ticks]",
         header.delay_ticks.to_string(),
-        spec.sampling
-            .ticks_of(spec.uncertainty.actuation_delay_s)
-            .to_string(),
+        late.to_string(),
     );
     let band = |band: &firmware::units::Band| format!("{:?}", [band.low_uhz, band.high_uhz]);
     let requirements = &spec.requirements;

@@ -17,6 +17,7 @@
 //! | tables with Hold: No control by tight sets, then whole cells for ever | `watching`, `closed` |
 //! | the worst number of periods | `longest_path` |
 //! | claims | `claims` |
+//! | tables that are a response: always on, no laws | `response` |
 //!
 //! # What is claimed
 //! The event finds the grid in a state of `uncertainty.initial` and the firmware in No control, at any moment between
@@ -38,6 +39,7 @@ mod longest_path;
 
 mod path;
 mod regions;
+pub mod response;
 mod segment;
 mod successor;
 mod tally;
@@ -93,6 +95,9 @@ pub fn verify(
     go_on: &dyn Fn(f64) -> bool,
 ) -> Result<Verdict, VerifyError> {
     let table = TableView::parse(bytes).map_err(VerifyError::Table)?;
+    if table.header().always_on || spec.preference.always_on {
+        return of_response(&table, spec, go_on);
+    }
     let header = table.header();
     let model = Model::new(&table, spec);
     let regions = Regions::new(header, model.error);
@@ -177,6 +182,33 @@ pub fn verify(
         counts,
         tool_version: env!("CARGO_PKG_VERSION").to_owned(),
         failures,
+    })
+}
+
+/// The verdict on a response, or on a table for a spec that asks for one.
+fn of_response(
+    table: &TableView<'_>,
+    spec: &Spec,
+    go_on: &dyn Fn(f64) -> bool,
+) -> Result<Verdict, VerifyError> {
+    let header = table.header();
+    let mut claims = vec![claims::header(table, spec)];
+    let proof = response::verify(table, spec, go_on)?;
+    claims.extend(proof.claims);
+    Ok(Verdict {
+        verified: claims.iter().all(|claim| claim.holds),
+        spec: spec.name.clone(),
+        claims,
+        reachable_cells: 0,
+        counterexample: None,
+        spec_hash: hex(&spec.hash()),
+        table_spec_hash: hex(&header.spec_hash),
+        table_sha256: hex(&Sha256::digest(table.bytes())),
+        table_bytes: table.bytes().len(),
+        method: proof.method,
+        counts: proof.counts,
+        tool_version: env!("CARGO_PKG_VERSION").to_owned(),
+        failures: Vec::new(),
     })
 }
 

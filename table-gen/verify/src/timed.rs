@@ -315,7 +315,7 @@ impl<'a> Timed<'a> {
                 self.tally.periods_c2 = self.tally.periods_c2.max(age.c2_run);
             }
             Phase::NoControl => return age,
-            Phase::Fixed | Phase::Hold | Phase::Fallback => {
+            Phase::Fixed | Phase::Hold | Phase::Fallback | Phase::Response => {
                 if age.first {
                     let ticks = tick + 1 + self.model.delay_ticks();
                     self.tally.event_ticks = self.tally.event_ticks.max(ticks);

@@ -28,7 +28,7 @@ fn delayed(more: &[&str]) -> Spec {
         .chain(more)
         .map(|s| (*s).to_owned())
         .collect();
-    Spec::load("gb-bi", &all).unwrap()
+    Spec::load("gb-bi-band", &all).unwrap()
 }
 
 static DELAYED_TABLE: LazyLock<Vec<u8>> = LazyLock::new(|| table(&delayed(&[])));

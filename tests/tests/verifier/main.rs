@@ -33,7 +33,7 @@ const SMALL: [&str; 6] = [
 /// The small spec, with further overrides.
 fn small(more: &[&str]) -> Spec {
     let all: Vec<String> = SMALL.iter().chain(more).map(|s| (*s).to_owned()).collect();
-    Spec::load("gb-bi", &all).unwrap()
+    Spec::load("gb-bi-band", &all).unwrap()
 }
 
 /// The dense table of a spec.

@@ -147,7 +147,10 @@ impl<'a> Trajectories<'a> {
             level: 0,
             acting: Phase::NoControl,
         });
-        let late = self.spec.sampling.ticks_of(uncertainty.actuation_delay_s);
+        let late = self
+            .spec
+            .sampling
+            .ticks_of(uncertainty.actuation_delay_s.most_s());
         let mut under_way: VecDeque<Command> = (0..late).map(|_| Command::NONE).collect();
         let (share, _) = adversary.tick(&x);
         let power = self.net_power(Command::NONE, share);

@@ -51,7 +51,7 @@ impl Scenario {
             participation_error: 0.0,
             measurement: [0.0; 4],
             event_offset_s: 0.0,
-            delay_s: spec.uncertainty.actuation_delay_s,
+            delay_s: spec.uncertainty.actuation_delay_s.most_s(),
             seed: 0,
             initial: std::array::from_fn(|d| 0.5 * (initial.lower[d] + initial.upper[d])),
         }

@@ -49,6 +49,7 @@ pub fn phase_name(phase: Phase) -> &'static str {
         Phase::Fixed => "fixed",
         Phase::Hold => "hold",
         Phase::Fallback => "fallback",
+        Phase::Response => "response",
     }
 }
 

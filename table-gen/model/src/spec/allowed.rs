@@ -85,6 +85,15 @@ pub enum Allowed {
         /// Range of each element.
         each: Range,
     },
+    /// An array of numbers, or no such key at all.
+    OptionalNumbers {
+        /// Number of elements.
+        len: usize,
+        /// Range of each element.
+        each: Range,
+    },
+    /// One finite number, or an array of two, the ends of an interval.
+    NumberOrInterval(Range),
     /// A whole number, written without a decimal point.
     Integer {
         /// Least value.
@@ -106,7 +115,10 @@ impl Allowed {
     /// Whether the key may be absent with a meaning of its own, rather than standing for its default.
     #[must_use]
     pub fn is_optional(&self) -> bool {
-        matches!(self, Self::OptionalNumber(_) | Self::OptionalFormula)
+        matches!(
+            self,
+            Self::OptionalNumber(_) | Self::OptionalNumbers { .. } | Self::OptionalFormula
+        )
     }
 }
 
@@ -116,6 +128,10 @@ impl fmt::Display for Allowed {
             Self::Number(range) => write!(f, "a number {range}"),
             Self::OptionalNumber(range) => write!(f, "a number {range}, or none"),
             Self::Numbers { len, each } => write!(f, "{len} numbers, each {each}"),
+            Self::OptionalNumbers { len, each } => {
+                write!(f, "{len} numbers, each {each}, or none")
+            }
+            Self::NumberOrInterval(range) => write!(f, "a number {range}, or 2 such numbers"),
             Self::Integer { min, max } => write!(f, "a whole number from {min} to {max}"),
             Self::Flag => f.write_str("true or false"),
             Self::Choice(names) => {

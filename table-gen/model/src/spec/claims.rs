@@ -2,7 +2,35 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::DelayRange;
 use super::grid::to_micro;
+
+/// How the lost infeed moves inside its band.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum LossProfile {
+    /// As an adversary likes, at all times.
+    Band,
+    /// It steps to one value of the band and stays there.
+    Constant,
+    /// It steps upwards, at any times.
+    NonDecreasing,
+}
+
+impl LossProfile {
+    /// All values as the spec writes them.
+    pub(super) const NAMES: &'static [&'static str] = &["band", "constant", "non-decreasing"];
+
+    /// The value as the spec writes it.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Band => "band",
+            Self::Constant => "constant",
+            Self::NonDecreasing => "non-decreasing",
+        }
+    }
+}
 
 /// Bounds on what is not known exactly. Every bound holds at all times, for an adversary that may vary it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -12,18 +40,46 @@ pub struct UncertaintySpec {
     ///
     /// Unit: GW. Allowed: 2 numbers, each from -100 to 100. Default: [2, 2].
     pub loss_gw: [f64; 2],
+    /// How w moves inside its band. What holds for "band" holds for the others too.
+    ///
+    /// Unit: -. Allowed: "band" or "constant" or "non-decreasing". Default: "band".
+    pub loss_profile: LossProfile,
     /// Relative error of participation: the fleet delivers u (1 +- this), at most 1. The paper simulates 0.1.
     ///
     /// Unit: 1. Allowed: a number from 0 to below 1. Default: 0.
     pub participation: f64,
+    /// Error of participation beside the relative one, as a share of the fleet.
+    ///
+    /// Unit: 1. Allowed: a number from 0 to below 1. Default: 0.
+    pub participation_absolute: f64,
     /// Bound on the error of the state estimate, per state (f, g, l, p).
     ///
     /// Unit: Hz, GW, GW, GW. Allowed: 4 numbers, each from 0 to 10. Default: [0, 0, 0, 0].
     pub measurement: [f64; 4],
-    /// Time from a decision to the fleet's power.
+    /// Time from a decision to its power: one number for the fleet, or `[least, most]` where each
+    /// charger has its own anywhere between, changing as it likes.
     ///
-    /// Unit: s. Allowed: a number from 0 to 60. Default: 0.
-    pub actuation_delay_s: f64,
+    /// Unit: s. Allowed: a number from 0 to 60, or 2 such numbers. Default: 0.
+    pub actuation_delay_s: DelayRange,
+    /// H anywhere in this, constant, unknown to the charger; absent: the plant's.
+    ///
+    /// Unit: GW s/Hz. Allowed: 2 numbers, each from 0.001 to 10000, or none. Default: none.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub inertia_gw_s_per_hz: Option<[f64; 2]>,
+    /// 1/R_eq anywhere in this, constant, unknown to the charger; absent: the plant's.
+    ///
+    /// Unit: GW/Hz. Allowed: 2 numbers, each from -100 to below 0, or none. Default: none.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub governor_gain_gw_per_hz: Option<[f64; 2]>,
+    /// D anywhere in this, constant, unknown to the charger; absent: the plant's.
+    ///
+    /// Unit: GW/Hz. Allowed: 2 numbers, each from 0 to 1000, or none. Default: none.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub damping_gw_per_hz: Option<[f64; 2]>,
+    /// Whether each charger decides at moments of its own, on readings of its own.
+    ///
+    /// Unit: -. Allowed: true or false. Default: false.
+    pub own_clocks: bool,
     /// States in which the event may find the grid; must lie inside the grid.
     pub initial: InitialBox,
 }
@@ -32,9 +88,15 @@ impl Default for UncertaintySpec {
     fn default() -> Self {
         Self {
             loss_gw: [2.0, 2.0],
+            loss_profile: LossProfile::Band,
             participation: 0.0,
+            participation_absolute: 0.0,
             measurement: [0.0; 4],
-            actuation_delay_s: 0.0,
+            actuation_delay_s: DelayRange::exactly(0.0),
+            inertia_gw_s_per_hz: None,
+            governor_gain_gw_per_hz: None,
+            damping_gw_per_hz: None,
+            own_clocks: false,
             initial: InitialBox::default(),
         }
     }
@@ -158,12 +220,17 @@ pub struct TableSpec {
     ///
     /// Unit: -. Allowed: "winning" or "reachable". Default: "winning".
     pub domain: Domain,
+    /// Version of the table: one that replaces another has a larger number.
+    ///
+    /// Unit: 1. Allowed: a whole number from 0 to 4294967295. Default: 1.
+    pub version: u32,
 }
 
 impl Default for TableSpec {
     fn default() -> Self {
         Self {
             domain: Domain::Winning,
+            version: 1,
         }
     }
 }

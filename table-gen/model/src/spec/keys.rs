@@ -2,9 +2,11 @@
 
 use std::fmt;
 
+use super::DelayRange;
 use super::allowed::{Allowed, Range};
-use super::claims::Domain;
+use super::claims::{Domain, LossProfile};
 use super::grid::{Alignment, MICRO_PER_UNIT};
+use super::meter::MeterKind;
 use super::plant::Direction;
 use super::sampling::Successor;
 use super::{Spec, formula};
@@ -160,6 +162,16 @@ fn optional(value: Option<f64>) -> KeyValue<'static> {
     value.map_or(KeyValue::Absent, KeyValue::Number)
 }
 
+fn optionals(values: Option<&[f64; 2]>) -> KeyValue<'_> {
+    values.map_or(KeyValue::Absent, |values| KeyValue::Numbers(values))
+}
+
+fn interval(range: &DelayRange) -> KeyValue<'_> {
+    range
+        .exact_s()
+        .map_or(KeyValue::Numbers(range.ends_s()), KeyValue::Number)
+}
+
 const TIME_CONSTANT: Allowed = Allowed::Number(Range::closed(0.001, 1000.0));
 const DURATION: Range = Range::above(0.0, 86_400.0);
 const STATE: Allowed = Allowed::Numbers {
@@ -175,6 +187,10 @@ const INTERVAL: Allowed = Allowed::Numbers {
     each: Range::closed(-10.0, 10.0),
 };
 const STATE_UNIT: &str = "Hz, GW, GW, GW";
+
+/// Longest tick \[s\], as the device's reader has it.
+const WATCH_MAX_S: f64 = 0.2;
+const _: () = assert!(WATCH_MAX_S * 1e3 == firmware::table::TICK_MS_MAX as f64);
 
 const STATE_MAX: f64 = 2000.0;
 const WIDTH_MAX: f64 = 100.0;
@@ -230,17 +246,63 @@ pub(super) const KEYS: &[Key] = &[
 
     row("sampling.period_s", "s", Allowed::Number(Range::closed(0.001, 3600.0)),
         "sampling time tau of C1, C2 and Hold", |s| KeyValue::Number(s.sampling.period_s)),
-    row("sampling.watch_s", "s", Allowed::Number(Range::closed(0.001, 60.0)),
+    row("sampling.watch_s", "s", Allowed::Number(Range::closed(0.001, WATCH_MAX_S)),
         "watch tick of No control and Fixed; divides the period", |s| KeyValue::Number(s.sampling.watch_s)),
+
+    row("preference.always_on", "-", Allowed::Flag,
+        "whether the preferred law itself is the table, and no games are played", |s| KeyValue::Flag(s.preference.always_on)),
+    row("preference.droop_gw_per_hz", "GW/Hz", Allowed::Number(Range::closed(0.0, 1000.0)),
+        "power for each Hz below the set-point", |s| KeyValue::Number(s.preference.droop_gw_per_hz)),
+    row("preference.setpoint_hz", "Hz", Allowed::Number(Range::closed(-5.0, 5.0)),
+        "deviation at which the droop term is zero", |s| KeyValue::Number(s.preference.setpoint_hz)),
+    row("preference.slope_gain_gw_s_per_hz", "GW s/Hz", Allowed::Number(Range::closed(0.0, 1000.0)),
+        "power for each Hz/s of fall beyond the threshold", |s| KeyValue::Number(s.preference.slope_gain_gw_s_per_hz)),
+    row("preference.slope_threshold_hz_per_s", "Hz/s", Allowed::Number(Range::closed(0.0, 100.0)),
+        "fall without an answer to the slope", |s| KeyValue::Number(s.preference.slope_threshold_hz_per_s)),
+    row("preference.slope_window_s", "s", Allowed::Number(Range::closed(0.001, 6.4)),
+        "time over which the slope is taken; whole ticks, at most 32", |s| KeyValue::Number(s.preference.slope_window_s)),
+    row("preference.slope_most_gw", "GW", Allowed::Number(Range::closed(0.0, 1000.0)),
+        "largest answer to the slope; at most the fleet's power", |s| KeyValue::Number(s.preference.slope_most_gw)),
+    row("preference.slope_release_gw_per_s", "GW/s", Allowed::Number(Range::closed(0.0, 1000.0)),
+        "how fast the answer to the slope is let go", |s| KeyValue::Number(s.preference.slope_release_gw_per_s)),
+    row("preference.smallest_change", "1", Allowed::Number(Range::closed(0.001, 1.0)),
+        "smallest change of a charger's participation", |s| KeyValue::Number(s.preference.smallest_change)),
+
+    row("meter.kind", "-", Allowed::Choice(MeterKind::NAMES),
+        "what measures the frequency", |s| KeyValue::Text(s.meter.kind.name())),
+    row("meter.jitter_us", "µs", Allowed::Number(Range::closed(0.0, 1000.0)),
+        "largest error of the time of a zero crossing", |s| KeyValue::Number(s.meter.jitter_us)),
+    row("meter.clock_ppm", "ppm", Allowed::Number(Range::closed(0.0, 1000.0)),
+        "error of the meter's clock, temperature and ageing included", |s| KeyValue::Number(s.meter.clock_ppm)),
+    row("meter.resolution_hz", "Hz", Allowed::Number(Range::closed(0.0, 1.0)),
+        "step between two readings", |s| KeyValue::Number(s.meter.resolution_hz)),
+    row("meter.window_cycles", "1", Allowed::Integer { min: 1, max: 50 },
+        "mains cycles over which a reading is averaged", |s| KeyValue::Integer(s.meter.window_cycles)),
+    row("meter.latest_age_ms", "ms", Allowed::Number(Range::closed(0.0, 1000.0)),
+        "longest age of a reading when a decision goes by it", |s| KeyValue::Number(s.meter.latest_age_ms)),
+    row("meter.bias_hz", "Hz", Allowed::Number(Range::closed(0.0, 0.1)),
+        "largest constant error of a reading, the clock's apart", |s| KeyValue::Number(s.meter.bias_hz)),
 
     row("uncertainty.loss_gw", "GW", Allowed::Numbers { len: 2, each: Range::closed(-100.0, 100.0) },
         "band of the lost infeed w", |s| KeyValue::Numbers(&s.uncertainty.loss_gw)),
+    row("uncertainty.loss_profile", "-", Allowed::Choice(LossProfile::NAMES),
+        "how w moves inside its band", |s| KeyValue::Text(s.uncertainty.loss_profile.name())),
     row("uncertainty.participation", "1", Allowed::Number(Range::below(0.0, 1.0)),
         "relative error of participation", |s| KeyValue::Number(s.uncertainty.participation)),
+    row("uncertainty.participation_absolute", "1", Allowed::Number(Range::below(0.0, 1.0)),
+        "error of participation beside the relative one", |s| KeyValue::Number(s.uncertainty.participation_absolute)),
     row("uncertainty.measurement", STATE_UNIT, Allowed::Numbers { len: 4, each: Range::closed(0.0, 10.0) },
         "bound on the state estimate's error (f, g, l, p)", |s| KeyValue::Numbers(&s.uncertainty.measurement)),
-    row("uncertainty.actuation_delay_s", "s", Allowed::Number(Range::closed(0.0, 60.0)),
-        "time from a decision to the fleet's power", |s| KeyValue::Number(s.uncertainty.actuation_delay_s)),
+    row("uncertainty.actuation_delay_s", "s", Allowed::NumberOrInterval(Range::closed(0.0, 60.0)),
+        "time from a decision to its power; or least and most, each charger's own", |s| interval(&s.uncertainty.actuation_delay_s)),
+    row("uncertainty.inertia_gw_s_per_hz", "GW s/Hz", Allowed::OptionalNumbers { len: 2, each: Range::closed(0.001, 10_000.0) },
+        "band of H, unknown to the charger; absent: the plant's", |s| optionals(s.uncertainty.inertia_gw_s_per_hz.as_ref())),
+    row("uncertainty.governor_gain_gw_per_hz", "GW/Hz", Allowed::OptionalNumbers { len: 2, each: Range::below(-100.0, 0.0) },
+        "band of 1/R_eq, unknown to the charger; absent: the plant's", |s| optionals(s.uncertainty.governor_gain_gw_per_hz.as_ref())),
+    row("uncertainty.damping_gw_per_hz", "GW/Hz", Allowed::OptionalNumbers { len: 2, each: Range::closed(0.0, 1000.0) },
+        "band of D, unknown to the charger; absent: the plant's", |s| optionals(s.uncertainty.damping_gw_per_hz.as_ref())),
+    row("uncertainty.own_clocks", "-", Allowed::Flag,
+        "whether each charger decides at moments of its own, on readings of its own", |s| KeyValue::Flag(s.uncertainty.own_clocks)),
     row("uncertainty.initial.lower", STATE_UNIT, STATE,
         "lower corner of the states at the event (f, g, l, p)", |s| KeyValue::Numbers(&s.uncertainty.initial.lower)),
     row("uncertainty.initial.upper", STATE_UNIT, STATE,
@@ -263,6 +325,8 @@ pub(super) const KEYS: &[Key] = &[
 
     row("table.domain", "-", Allowed::Choice(Domain::NAMES),
         "which cells the table answers for", |s| KeyValue::Text(s.table.domain.name())),
+    row("table.version", "1", Allowed::Integer { min: 0, max: u32::MAX },
+        "version of the table; one that replaces another has a larger number", |s| KeyValue::Integer(s.table.version)),
 
     row("method.successor", "-", Allowed::Choice(Successor::NAMES),
         "how the radius of a successor box is bounded", |s| KeyValue::Text(s.method.successor.name())),

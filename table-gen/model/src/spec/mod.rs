@@ -22,6 +22,7 @@
 
 mod allowed;
 mod claims;
+mod delay_range;
 mod error;
 mod formula;
 mod geometry;
@@ -30,9 +31,12 @@ mod hash;
 mod keys;
 mod load;
 mod memory;
+mod meter;
 mod overrides;
 mod plant;
+mod preference;
 mod resolve;
+mod response;
 mod sampling;
 mod schema;
 mod shipped;
@@ -41,10 +45,13 @@ mod tests;
 mod validate;
 
 pub use allowed::{Allowed, Range};
-pub use claims::{Domain, InitialBox, RequirementsSpec, TableSpec, UncertaintySpec};
+pub use claims::{Domain, InitialBox, LossProfile, RequirementsSpec, TableSpec, UncertaintySpec};
+pub use delay_range::DelayRange;
 pub use error::SpecError;
 pub use grid::{Alignment, GridSpec};
 pub use keys::{KeyDoc, reference};
+pub use meter::{MeterKind, MeterSpec};
 pub use plant::{BaselineSpec, Direction, FleetSpec, PlantSpec};
+pub use preference::PreferenceSpec;
 pub use sampling::{InputSpec, MethodSpec, SamplingSpec, Successor};
 pub use schema::Spec;

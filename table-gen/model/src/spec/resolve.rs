@@ -45,9 +45,14 @@ fn check_value(key: &'static Key, value: &Value, origin: &Origin) -> Result<(), 
     let is_number = |value: &Value| matches!(value, Value::Float(_) | Value::Integer(_));
     let right_type = match (key.allowed, value) {
         (Allowed::Number(_) | Allowed::OptionalNumber(_), value) => is_number(value),
-        (Allowed::Numbers { len, .. }, Value::Array(items)) => {
-            items.len() == len && items.iter().all(is_number)
+        (
+            Allowed::Numbers { len, .. } | Allowed::OptionalNumbers { len, .. },
+            Value::Array(items),
+        ) => items.len() == len && items.iter().all(is_number),
+        (Allowed::NumberOrInterval(_), Value::Array(items)) => {
+            items.len() == 2 && items.iter().all(is_number)
         }
+        (Allowed::NumberOrInterval(_), value) => is_number(value),
         (Allowed::Integer { .. }, Value::Integer(_)) => true,
         (Allowed::Flag, Value::Boolean(_)) => true,
         (Allowed::Choice(_) | Allowed::Name | Allowed::OptionalFormula, Value::String(_)) => true,

@@ -49,9 +49,10 @@ pub struct SamplingSpec {
     /// Unit: s. Allowed: a number from 0.001 to 3600. Default: 1.5.
     pub period_s: f64,
     /// Watch tick: in No control and Fixed the phase is examined this often, and tau's clock starts at the switch.
-    /// A whole number of milliseconds, at most 65535 to the period.
+    /// A whole number of milliseconds, at most 65535 to the period. At most half of the
+    /// time after which a charger's watchdog bites.
     ///
-    /// Unit: s. Allowed: a number from 0.001 to 60. Default: 0.1.
+    /// Unit: s. Allowed: a number from 0.001 to 0.2. Default: 0.1.
     pub watch_s: f64,
 }
 

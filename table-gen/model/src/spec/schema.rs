@@ -3,8 +3,8 @@
 use serde::{Deserialize, Serialize};
 
 use super::{
-    BaselineSpec, FleetSpec, GridSpec, InputSpec, MethodSpec, PlantSpec, RequirementsSpec,
-    SamplingSpec, TableSpec, UncertaintySpec,
+    BaselineSpec, FleetSpec, GridSpec, InputSpec, MeterSpec, MethodSpec, PlantSpec, PreferenceSpec,
+    RequirementsSpec, SamplingSpec, TableSpec, UncertaintySpec,
 };
 
 /// A complete specification; one field per section of the TOML document.
@@ -30,6 +30,10 @@ pub struct Spec {
     pub input: InputSpec,
     /// When decisions are made.
     pub sampling: SamplingSpec,
+    /// The law that is preferred, or always on.
+    pub preference: PreferenceSpec,
+    /// What measures the frequency.
+    pub meter: MeterSpec,
     /// What is not known exactly, as bounds.
     pub uncertainty: UncertaintySpec,
     /// What is to be proved.
@@ -50,6 +54,8 @@ impl Default for Spec {
             grid: GridSpec::default(),
             input: InputSpec::default(),
             sampling: SamplingSpec::default(),
+            preference: PreferenceSpec::default(),
+            meter: MeterSpec::default(),
             uncertainty: UncertaintySpec::default(),
             requirements: RequirementsSpec::default(),
             table: TableSpec::default(),
@@ -67,6 +73,29 @@ impl Spec {
         /// kW per GW.
         const KW_PER_GW: f64 = 1e6;
         f64::from(self.fleet.chargers) * self.fleet.power_per_charger_kw / KW_PER_GW
+    }
+
+    /// Least and most H \[GW s/Hz\]: the band of `[uncertainty]`, or the plant's.
+    #[must_use]
+    pub fn inertia_band(&self) -> [f64; 2] {
+        let nominal = self.plant.inertia_gw_s_per_hz;
+        self.uncertainty.inertia_gw_s_per_hz.unwrap_or([nominal; 2])
+    }
+
+    /// Least and most 1/R_eq \[GW/Hz\]: the band of `[uncertainty]`, or the plant's.
+    #[must_use]
+    pub fn governor_gain_band(&self) -> [f64; 2] {
+        let nominal = self.plant.governor_gain_gw_per_hz;
+        self.uncertainty
+            .governor_gain_gw_per_hz
+            .unwrap_or([nominal; 2])
+    }
+
+    /// Least and most D \[GW/Hz\]: the band of `[uncertainty]`, or the plant's.
+    #[must_use]
+    pub fn damping_band(&self) -> [f64; 2] {
+        let nominal = self.plant.damping_gw_per_hz;
+        self.uncertainty.damping_gw_per_hz.unwrap_or([nominal; 2])
     }
 }
 

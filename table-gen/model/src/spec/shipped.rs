@@ -5,11 +5,20 @@ pub(super) const SHIPPED: &[(&str, &str)] = &[
     ("paper-bi", include_str!("../../../specs/paper-bi.toml")),
     ("paper-uni", include_str!("../../../specs/paper-uni.toml")),
     ("gb-bi", include_str!("../../../specs/gb-bi.toml")),
+    ("gb-uni", include_str!("../../../specs/gb-uni.toml")),
+    (
+        "gb-low-inertia",
+        include_str!("../../../specs/gb-low-inertia.toml"),
+    ),
+    ("gb-bi-band", include_str!("../../../specs/gb-bi-band.toml")),
+    (
+        "gb-uni-band",
+        include_str!("../../../specs/gb-uni-band.toml"),
+    ),
     (
         "gb-bi-delay",
         include_str!("../../../specs/gb-bi-delay.toml"),
     ),
-    ("gb-uni", include_str!("../../../specs/gb-uni.toml")),
     (
         "gb-bi-normal",
         include_str!("../../../specs/gb-bi-normal.toml"),

@@ -8,6 +8,7 @@ use super::overrides::Origin;
 use super::sampling::{to_ms, to_whole_ms};
 use super::{
     InputSpec, RequirementsSpec, SamplingSpec, Spec, SpecError, UncertaintySpec, formula, geometry,
+    response,
 };
 
 /// The allowed inputs of a cell are a mask of 32 bits.
@@ -36,7 +37,10 @@ impl Spec {
         check_input(&self.input, origin)?;
         check_sampling(&self.sampling, origin)?;
         check_uncertainty(&self.uncertainty, origin)?;
-        check_delay(&self.uncertainty, &self.sampling, origin)?;
+        if !self.preference.always_on {
+            check_delay(&self.uncertainty, &self.sampling, origin)?;
+        }
+        response::check(self, origin)?;
         check_requirements(&self.requirements, origin)?;
         geometry::check_grid(&self.grid, origin)?;
         geometry::check_initial(self, origin)?;
@@ -63,6 +67,8 @@ fn check_range(key: &'static Key, value: KeyValue<'_>, origin: &Origin) -> Resul
         (
             Allowed::Number(range)
             | Allowed::OptionalNumber(range)
+            | Allowed::NumberOrInterval(range)
+            | Allowed::OptionalNumbers { each: range, .. }
             | Allowed::Numbers { each: range, .. },
             _,
         ) => numbers.iter().all(|x| range.contains(*x)),
@@ -145,25 +151,54 @@ fn check_sampling(sampling: &SamplingSpec, origin: &Origin) -> Result<(), SpecEr
 }
 
 fn check_uncertainty(uncertainty: &UncertaintySpec, origin: &Origin) -> Result<(), SpecError> {
-    let [low, high] = uncertainty.loss_gw;
-    if low > high {
-        return Err(SpecError::Inverted {
-            origin: origin.of("uncertainty.loss_gw"),
-            key: "uncertainty.loss_gw",
-            found: format!("[{low}, {high}] GW"),
-            allowed: "[low, high] with low at most high".to_owned(),
-        });
+    let intervals = [
+        ("uncertainty.loss_gw", Some(uncertainty.loss_gw), "GW"),
+        (
+            "uncertainty.actuation_delay_s",
+            Some(*uncertainty.actuation_delay_s.ends_s()),
+            "s",
+        ),
+        (
+            "uncertainty.inertia_gw_s_per_hz",
+            uncertainty.inertia_gw_s_per_hz,
+            "GW s/Hz",
+        ),
+        (
+            "uncertainty.governor_gain_gw_per_hz",
+            uncertainty.governor_gain_gw_per_hz,
+            "GW/Hz",
+        ),
+        (
+            "uncertainty.damping_gw_per_hz",
+            uncertainty.damping_gw_per_hz,
+            "GW/Hz",
+        ),
+    ];
+    for (key, interval, unit) in intervals {
+        if let Some([low, high]) = interval
+            && low > high
+        {
+            return Err(SpecError::Inverted {
+                origin: origin.of(key),
+                key,
+                found: format!("[{low}, {high}] {unit}"),
+                allowed: "[low, high] with low at most high".to_owned(),
+            });
+        }
     }
     Ok(())
 }
 
-/// The device remembers the commands of so many ticks.
+/// For laws by games the device remembers the commands of so many ticks.
 fn check_delay(
     uncertainty: &UncertaintySpec,
     sampling: &SamplingSpec,
     origin: &Origin,
 ) -> Result<(), SpecError> {
-    let delay_s = uncertainty.actuation_delay_s;
+    // A range is a matter of `response`.
+    let Some(delay_s) = uncertainty.actuation_delay_s.exact_s() else {
+        return Ok(());
+    };
     let watch_ms = sampling.watch_ms().max(1);
     let whole = to_whole_ms(delay_s).is_some_and(|delay_ms| delay_ms % watch_ms == 0);
     let ticks = sampling.ticks_of(delay_s);

@@ -4,8 +4,9 @@ pub mod measured;
 pub mod microcontrollers;
 pub mod sweep;
 
+use firmware::phase::Phase;
 use firmware::prediction::prediction_len;
-use firmware::table::{CRC_LEN, HEADER_LEN, Law, TableView};
+use firmware::table::{CRC_LEN, HEADER_LEN, Law, RESPONSE_LEN, TableView};
 use model::budget::{Budget, LawBudget, Room};
 
 use crate::inspect;
@@ -14,6 +15,13 @@ use measured::measured;
 /// Adds a table up.
 pub fn budget(table: &TableView<'_>) -> Budget {
     let bytes = table.bytes().len();
+    let response = table.response().map(|_| LawBudget {
+        law: Phase::Response.name().into(),
+        domain_bytes: 0,
+        inputs_bytes: RESPONSE_LEN as u32,
+        worst_visits: 0,
+        mean_visits: 0.0,
+    });
     let laws = Law::ALL
         .into_iter()
         .filter_map(|law| {
@@ -27,6 +35,7 @@ pub fn budget(table: &TableView<'_>) -> Budget {
                 mean_visits: survey.visits_mean,
             })
         })
+        .chain(response)
         .collect();
     let rooms = microcontrollers::all()
         .into_iter()

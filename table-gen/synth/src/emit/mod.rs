@@ -2,15 +2,16 @@
 
 pub mod dense;
 
-use firmware::droop::Droop;
 use firmware::grid::Grid;
 use firmware::table::{
-    self, Header, LAWS, LawEntry, PlantParameters, TableError, TableView, WriteError,
+    self, Header, Hypotheses, LAWS, LawEntry, TableError, TableView, WriteError,
 };
 use firmware::units::Band;
 
 use crate::delay::{self, Delay, DelayError};
+
 use model::spec::Spec;
+use model::table_fields::{self, FieldError};
 
 /// One law, encoded.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -45,9 +46,15 @@ pub enum EmitError {
         /// What fits.
         allowed: &'static str,
     },
+    /// The same, for what the header says was assumed, and for a response.
+    #[error(transparent)]
+    Hypotheses(#[from] FieldError),
     /// A delay that the device cannot predict over.
     #[error(transparent)]
     Delay(#[from] DelayError),
+    /// The spec's laws come from games.
+    #[error("preference.always_on is false: the laws come from games")]
+    NotAlwaysOn,
     /// The image is too long.
     #[error("the table does not fit its length field: {0:?}")]
     Write(WriteError),
@@ -61,7 +68,11 @@ pub enum EmitError {
 /// # Errors
 /// A number that does not fit its field.
 pub fn head(spec: &Spec, grid: Grid) -> Result<Head, EmitError> {
-    let delay = Delay::of(spec)?;
+    let delay = if spec.preference.always_on {
+        None
+    } else {
+        Delay::of(spec)?
+    };
     Ok(Head {
         header: header(spec, grid)?,
         prediction: delay.map_or_else(Vec::new, |delay| delay.coefficients.bytes()),
@@ -72,9 +83,6 @@ fn header(spec: &Spec, grid: Grid) -> Result<Header, EmitError> {
     let band = |[low_uhz, high_uhz]: [i32; 2]| Band { low_uhz, high_uhz };
     let ms = "1 to 65535 ms";
     let ticks = spec.sampling.ticks_per_period();
-    let baseline = &spec.baseline;
-    // The droop of the baseline rests at e / (R_ev D); with D = 0 its integrator saturates at once.
-    let full_hz = baseline.droop_hz * spec.plant.damping_gw_per_hz;
     let step = spec.input.value(1);
     Ok(Header {
         spec_hash: spec.hash(),
@@ -82,36 +90,46 @@ fn header(spec: &Spec, grid: Grid) -> Result<Header, EmitError> {
         input_step_ppm: micro_u32("input.step", step)?,
         levels: spec.input.levels() as u8,
         stay: spec.requirements.stay,
+        always_on: spec.preference.always_on,
         tick_ms: narrow("sampling.watch_s", spec.sampling.watch_ms(), ms)?,
         period_ticks: narrow("sampling.period_s", ticks, "1 to 65535 ticks of watch_s")?,
         // The spec allows 64 ticks at most.
-        delay_ticks: delay::ticks(spec) as u16,
+        delay_ticks: if spec.preference.always_on {
+            0
+        } else {
+            delay::ticks(spec) as u16
+        },
         outer: band(spec.requirements.outer_micro()),
         inner: band(spec.requirements.inner_micro()),
-        droop: Droop {
-            deadband_uhz: micro_u32("baseline.deadband_hz", baseline.deadband_hz)?,
-            full_uhz: micro_u32("baseline.droop_hz", full_hz)?.max(1),
+        droop: table_fields::droop(spec)?,
+        plant: table_fields::plant(spec)?,
+        hypotheses: Hypotheses {
+            generator: generator(),
+            ..table_fields::hypotheses(spec)?
         },
-        plant: plant_parameters(spec)?,
         laws: [None; LAWS],
     })
 }
 
-fn plant_parameters(spec: &Spec) -> Result<PlantParameters, EmitError> {
-    let plant = &spec.plant;
-    Ok(PlantParameters {
-        governor_gain_kw_per_hz: -(micro_u32(
-            "plant.governor_gain_gw_per_hz",
-            -plant.governor_gain_gw_per_hz,
-        )? as i32),
-        governor_time_us: micro_u32("plant.governor_time_s", plant.governor_time_s)?,
-        turbine_time_us: micro_u32("plant.turbine_time_s", plant.turbine_time_s)?,
-        lead_time_us: micro_u32("plant.lead_time_s", plant.lead_time_s)?,
-        lag_time_us: micro_u32("plant.lag_time_s", plant.lag_time_s)?,
-        damping_kw_per_hz: micro_u32("plant.damping_gw_per_hz", plant.damping_gw_per_hz)?,
-        inertia_kw_s_per_hz: micro_u32("plant.inertia_gw_s_per_hz", plant.inertia_gw_s_per_hz)?,
-        fleet_kw: micro_u32("fleet.chargers", spec.fleet_power_gw())?,
-    })
+/// This program's version, as the header holds it: 8 bits of major, 12 of minor and 12 of patch.
+fn generator() -> u32 {
+    let part = |text: &str| text.parse::<u32>().unwrap_or(0);
+    let major = part(env!("CARGO_PKG_VERSION_MAJOR"));
+    let minor = part(env!("CARGO_PKG_VERSION_MINOR"));
+    let patch = part(env!("CARGO_PKG_VERSION_PATCH"));
+    (major << 24) | (minor << 12) | patch
+}
+
+/// The table of a spec whose preferred law is always on: a response. No game is played.
+///
+/// # Errors
+/// A spec whose laws come from games, or a number that does not fit its field.
+pub fn response(spec: &Spec, grid: Grid) -> Result<Vec<u8>, EmitError> {
+    let law = table_fields::response(spec)?.ok_or(EmitError::NotAlwaysOn)?;
+    let head = head(spec, grid)?;
+    let mut image = table::write_header(&head.header).to_vec();
+    image.extend_from_slice(&table::write_response(&law));
+    finish(image)
 }
 
 /// A number in whole micro-units.
@@ -160,6 +178,11 @@ pub fn assemble(
         image.extend_from_slice(&law.domain);
         image.extend_from_slice(&law.inputs);
     }
+    finish(image)
+}
+
+/// Seals what lies before the CRC. The firmware's reader must accept it.
+fn finish(mut image: Vec<u8>) -> Result<Vec<u8>, EmitError> {
     image.extend_from_slice(&[0; table::CRC_LEN]);
     table::seal(&mut image).map_err(EmitError::Write)?;
     TableView::parse(&image).map_err(EmitError::Rejected)?;

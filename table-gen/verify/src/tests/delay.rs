@@ -35,7 +35,7 @@ fn delayed(more: &[&str]) -> Spec {
         .chain(more)
         .map(|s| (*s).to_owned())
         .collect();
-    Spec::load("gb-bi", &all).unwrap()
+    Spec::load("gb-bi-band", &all).unwrap()
 }
 
 /// A table of head and no laws.
@@ -85,11 +85,11 @@ fn specs() -> Vec<Spec> {
         delayed(&["uncertainty.actuation_delay_s=0.1", "input.step=0.1"]),
         // Longer than a period, and with everything wide.
         load(
-            "gb-uni",
+            "gb-uni-band",
             &["uncertainty.actuation_delay_s=2.0", "sampling.period_s=0.5"],
         ),
         load(
-            "gb-bi",
+            "gb-bi-band",
             &[
                 "uncertainty.actuation_delay_s=6.4",
                 "uncertainty.participation=0.3",

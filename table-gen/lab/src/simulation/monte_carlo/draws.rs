@@ -38,7 +38,7 @@ impl Draws {
             participation_error: uncertainty.participation,
             measurement_error: uncertainty.measurement,
             loss_gw: uncertainty.loss_gw,
-            delay_s: [uncertainty.actuation_delay_s; 2],
+            delay_s: *uncertainty.actuation_delay_s.ends_s(),
             initial_lower: uncertainty.initial.lower,
             initial_upper: uncertainty.initial.upper,
             event_offset_s: spec.sampling.watch_s,

@@ -8,6 +8,11 @@ use super::{leaves, refused};
 /// TOML text of `bad` where `doc` takes a number, the other elements of an array taken from the default.
 fn with_bad_element(doc: &KeyDoc, bad: &str, element: usize) -> String {
     match doc.allowed {
+        Allowed::OptionalNumbers { len, .. } => {
+            let mut items = vec!["1"; len];
+            items[element] = bad;
+            format!("{}=[{}]", doc.key, items.join(", "))
+        }
         Allowed::Numbers { len, .. } => {
             let inner = doc.default.trim_matches(['[', ']']);
             let mut items: Vec<&str> = inner.split(", ").collect();
@@ -24,6 +29,8 @@ fn bad_numbers(doc: &KeyDoc) -> Vec<String> {
     let range = match doc.allowed {
         Allowed::Number(range)
         | Allowed::OptionalNumber(range)
+        | Allowed::NumberOrInterval(range)
+        | Allowed::OptionalNumbers { each: range, .. }
         | Allowed::Numbers { each: range, .. } => range,
         Allowed::Integer { min, max } => {
             return [i64::from(min) - 1, -1, i64::from(max) + 1, i64::MAX]
@@ -54,7 +61,14 @@ fn bad_numbers(doc: &KeyDoc) -> Vec<String> {
 
 #[test]
 fn the_key_table_and_the_structs_have_the_same_keys() {
-    let spec = Spec::load("paper-bi", &[]).unwrap();
+    // Optional keys are printed where they are there.
+    let bands = [
+        "preference.always_on=true",
+        "uncertainty.inertia_gw_s_per_hz=[2, 4]",
+        "uncertainty.governor_gain_gw_per_hz=[-5, -4]",
+        "uncertainty.damping_gw_per_hz=[0.8, 1]",
+    ];
+    let spec = super::with(&bands).unwrap();
     let text = toml::to_string(&spec).unwrap();
     let listed: BTreeSet<String> = reference().iter().map(|doc| doc.key.to_owned()).collect();
     let mut printed = leaves(&toml::from_str(&text).unwrap());
@@ -71,6 +85,8 @@ fn the_field_docs_agree_with_the_key_table() {
         include_str!("../grid.rs"),
         include_str!("../sampling.rs"),
         include_str!("../claims.rs"),
+        include_str!("../preference.rs"),
+        include_str!("../meter.rs"),
     ]
     .concat();
     for doc in reference() {
@@ -99,10 +115,9 @@ fn the_field_docs_agree_with_the_key_table() {
 fn every_number_out_of_range_or_not_finite_is_refused_by_its_key() {
     let mut tried = 0;
     for doc in reference() {
-        let elements = if let Allowed::Numbers { len, .. } = doc.allowed {
-            len
-        } else {
-            1
+        let elements = match doc.allowed {
+            Allowed::Numbers { len, .. } | Allowed::OptionalNumbers { len, .. } => len,
+            _ => 1,
         };
         for bad in bad_numbers(&doc) {
             for element in 0..elements {
@@ -136,8 +151,12 @@ fn every_key_refuses_every_other_type() {
     for doc in reference() {
         for value in values {
             let fits = match doc.allowed {
-                Allowed::Number(_) | Allowed::OptionalNumber(_) => value == "1.5",
-                Allowed::Numbers { .. } | Allowed::Integer { .. } => false,
+                Allowed::Number(_) | Allowed::OptionalNumber(_) | Allowed::NumberOrInterval(_) => {
+                    value == "1.5"
+                }
+                Allowed::Numbers { .. }
+                | Allowed::OptionalNumbers { .. }
+                | Allowed::Integer { .. } => false,
                 Allowed::Flag => value == "true",
                 // An override's text serves as a name whatever its type.
                 Allowed::Choice(_) => value == "\"text\"",
@@ -176,7 +195,13 @@ fn choices_and_names_are_listed() {
         message.ends_with("found \"edge\"; allowed: \"centres\" or \"edges\""),
         "{message}"
     );
-    for key in ["fleet.direction", "table.domain", "method.successor"] {
+    for key in [
+        "fleet.direction",
+        "meter.kind",
+        "uncertainty.loss_profile",
+        "table.domain",
+        "method.successor",
+    ] {
         refused(&[&format!("{key}=other")], key);
     }
     refused(&["name=../up"], "name");

@@ -109,11 +109,13 @@ fn the_input_step_divides_one_into_at_most_32_levels() {
 #[test]
 fn ticks_are_whole_milliseconds_and_divide_the_period() {
     refused(&["sampling.watch_s=0.0015"], "sampling.watch_s");
-    let message = refused(&["sampling.watch_s=0.4"], "sampling.period_s");
+    let message = refused(&["sampling.watch_s=0.2"], "sampling.period_s");
     assert!(message.contains("such as 1.6 s"), "{message}");
     refused(&["sampling.period_s=1.5000001"], "sampling.period_s");
-    let message = refused(&["sampling.watch_s=2"], "sampling.period_s");
-    assert!(message.contains("such as 2 s"), "{message}");
+    let message = refused(&["sampling.period_s=0.05"], "sampling.period_s");
+    assert!(message.contains("such as 0.1 s"), "{message}");
+    // A charger's watchdog would bite: the reader refuses such a table too.
+    refused(&["sampling.watch_s=0.201"], "sampling.watch_s");
     refused(
         &["sampling.period_s=66", "sampling.watch_s=0.001"],
         "sampling.watch_s",
@@ -192,4 +194,102 @@ fn a_delay_is_a_whole_number_of_ticks_that_the_device_remembers() {
         "sampling.watch_s=0.05",
     ])
     .unwrap();
+}
+
+/// A response on the paper's fleet, with these keys besides.
+fn response(more: &[&str]) -> Vec<String> {
+    std::iter::once("preference.always_on=true")
+        .chain(more.iter().copied())
+        .map(str::to_owned)
+        .collect()
+}
+
+#[test]
+fn what_games_do_not_cover_is_refused_by_its_key_and_taken_for_a_response() {
+    let only_responses = [
+        "uncertainty.actuation_delay_s=[0.1, 0.5]",
+        "uncertainty.inertia_gw_s_per_hz=[2.04, 5]",
+        "uncertainty.governor_gain_gw_per_hz=[-5, -4]",
+        "uncertainty.damping_gw_per_hz=[0.8, 1]",
+        "uncertainty.own_clocks=true",
+        "uncertainty.participation_absolute=0.01",
+        "meter.kind=zero-crossing",
+    ];
+    for option in only_responses {
+        let key = option.split('=').next().unwrap();
+        let message = refused(&[option], key);
+        assert!(message.contains("which games do not cover"), "{message}");
+        assert!(message.contains("preference.always_on"), "{message}");
+        Spec::load("paper-bi", &response(&[option])).unwrap();
+    }
+    // Games cover any loss in the band, so the gentler profiles too.
+    with(&["uncertainty.loss_profile=constant"]).unwrap();
+    // A response need not predict, so its delay need not be whole ticks.
+    Spec::load(
+        "paper-bi",
+        &response(&["uncertainty.actuation_delay_s=0.15"]),
+    )
+    .unwrap();
+}
+
+#[test]
+fn intervals_are_the_right_way_round() {
+    for option in [
+        "uncertainty.actuation_delay_s=[0.5, 0.1]",
+        "uncertainty.inertia_gw_s_per_hz=[5, 2]",
+        "uncertainty.governor_gain_gw_per_hz=[-4, -5]",
+        "uncertainty.damping_gw_per_hz=[1, 0.8]",
+    ] {
+        let key = option.split('=').next().unwrap();
+        let error = Spec::load("paper-bi", &response(&[option])).unwrap_err();
+        assert!(
+            matches!(&error, SpecError::Inverted { key: found, .. } if *found == key),
+            "{error:?}"
+        );
+    }
+}
+
+#[test]
+fn a_response_fits_the_device() {
+    let of = |option: &str| Spec::load("paper-bi", &response(&[option]));
+    let refused = |option: &str, key: &str| {
+        let error = of(option).unwrap_err();
+        assert_eq!(error.key(), Some(key), "{error}");
+        error.to_string()
+    };
+    let window = "preference.slope_window_s";
+    let message = refused("preference.slope_window_s=0.25", window);
+    assert!(message.contains("1 to 32 whole watch ticks"), "{message}");
+    refused("preference.slope_window_s=3.3", window);
+    of("preference.slope_window_s=3.2").unwrap();
+    let message = refused("preference.slope_most_gw=1.5", "preference.slope_most_gw");
+    assert!(message.contains("at most the fleet's 1.4 GW"), "{message}");
+    of("preference.slope_most_gw=1.4").unwrap();
+    // The whole fleet within 1 mHz: 1.4 GW / 0.001 Hz, more than the key's own range.
+    let small = "fleet.chargers=250";
+    let error = Spec::load(
+        "paper-bi",
+        &response(&[
+            small,
+            "preference.slope_most_gw=0.01",
+            "preference.droop_gw_per_hz=15",
+        ]),
+    )
+    .unwrap_err();
+    assert_eq!(error.key(), Some("preference.droop_gw_per_hz"), "{error}");
+    // 0.014 GW: 1000 GW s/Hz are 71 thousand fleets, past 31 bits of ppm.
+    let error = Spec::load(
+        "paper-bi",
+        &response(&[
+            small,
+            "preference.slope_most_gw=0.01",
+            "preference.slope_gain_gw_s_per_hz=1000",
+        ]),
+    )
+    .unwrap_err();
+    assert_eq!(
+        error.key(),
+        Some("preference.slope_gain_gw_s_per_hz"),
+        "{error}"
+    );
 }

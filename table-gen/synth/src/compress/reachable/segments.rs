@@ -134,7 +134,9 @@ fn mark(
     let (after, _) = before.step(table, state);
     let law = match after.phase {
         Phase::NoControl | Phase::Fixed => return Ok(()),
-        Phase::Fallback => return Err(CompressError::LeavesTable { state: state.0 }),
+        Phase::Fallback | Phase::Response => {
+            return Err(CompressError::LeavesTable { state: state.0 });
+        }
         Phase::C1 => Law::C1,
         Phase::C2 => Law::C2,
         Phase::Hold => Law::Hold,

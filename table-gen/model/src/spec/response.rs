@@ -1,0 +1,107 @@
+//! What goes with a response, and what goes with games only.
+
+use firmware::response::WINDOW_TICKS_MAX;
+
+use super::meter::MeterKind;
+use super::overrides::Origin;
+use super::sampling::to_whole_ms;
+use super::validate::inconsistent;
+use super::{Spec, SpecError};
+use crate::table_fields;
+
+/// Checks the preferred law, and that the spec's method covers what is uncertain.
+pub(super) fn check(spec: &Spec, origin: &Origin) -> Result<(), SpecError> {
+    if spec.preference.always_on {
+        check_law(spec, origin)
+    } else {
+        check_games(spec, origin)
+    }
+}
+
+/// A law that the device can hold in whole numbers.
+fn check_law(spec: &Spec, origin: &Origin) -> Result<(), SpecError> {
+    let preference = &spec.preference;
+    let watch_ms = spec.sampling.watch_ms().max(1);
+    let window_s = preference.slope_window_s;
+    let ticks = spec.sampling.ticks_of(window_s);
+    let whole = to_whole_ms(window_s).is_some_and(|ms| ms % watch_ms == 0);
+    if !whole || ticks == 0 || ticks > WINDOW_TICKS_MAX.into() {
+        let found = format!(
+            "{window_s} s, beside sampling.watch_s = {} s",
+            spec.sampling.watch_s
+        );
+        let allowed = format!("1 to {WINDOW_TICKS_MAX} whole watch ticks");
+        let key = "preference.slope_window_s";
+        return Err(inconsistent(origin, key, found, allowed));
+    }
+    let power_gw = spec.fleet_power_gw();
+    if preference.slope_most_gw > power_gw {
+        let found = format!("{} GW", preference.slope_most_gw);
+        let allowed = format!("at most the fleet's {power_gw} GW");
+        let key = "preference.slope_most_gw";
+        return Err(inconsistent(origin, key, found, allowed));
+    }
+    // The device's own limit: the whole fleet within 1 mHz.
+    if preference.droop_gw_per_hz > 1e3 * power_gw {
+        let found = format!("{} GW/Hz", preference.droop_gw_per_hz);
+        let allowed = format!("at most {} GW/Hz for this fleet", 1e3 * power_gw);
+        let key = "preference.droop_gw_per_hz";
+        return Err(inconsistent(origin, key, found, allowed));
+    }
+    match table_fields::response(spec) {
+        Ok(_) => Ok(()),
+        Err(error) => {
+            let found = error.value.to_string();
+            Err(inconsistent(origin, error.key, found, error.allowed))
+        }
+    }
+}
+
+/// What games do not cover must not be there.
+fn check_games(spec: &Spec, origin: &Origin) -> Result<(), SpecError> {
+    let uncertainty = &spec.uncertainty;
+    let is_response = "a response: preference.always_on = true";
+    let refuse = |key: &'static str, found: String, other: &str| {
+        Err(inconsistent(
+            origin,
+            key,
+            format!("{found}, which games do not cover"),
+            format!("{other}, or {is_response}"),
+        ))
+    };
+    if uncertainty.actuation_delay_s.exact_s().is_none() {
+        let found = format!("{:?} s", uncertainty.actuation_delay_s.ends_s());
+        return refuse("uncertainty.actuation_delay_s", found, "one number");
+    }
+    let bands = [
+        (
+            "uncertainty.inertia_gw_s_per_hz",
+            uncertainty.inertia_gw_s_per_hz,
+        ),
+        (
+            "uncertainty.governor_gain_gw_per_hz",
+            uncertainty.governor_gain_gw_per_hz,
+        ),
+        (
+            "uncertainty.damping_gw_per_hz",
+            uncertainty.damping_gw_per_hz,
+        ),
+    ];
+    for (key, band) in bands {
+        if let Some(band) = band {
+            return refuse(key, format!("{band:?}"), "none");
+        }
+    }
+    if uncertainty.own_clocks {
+        return refuse("uncertainty.own_clocks", "true".to_owned(), "false");
+    }
+    if uncertainty.participation_absolute > 0.0 {
+        let found = uncertainty.participation_absolute.to_string();
+        return refuse("uncertainty.participation_absolute", found, "0");
+    }
+    if spec.meter.kind != MeterKind::Ideal {
+        let found = format!("{:?}", spec.meter.kind.name());
+        return refuse("meter.kind", found, "\"ideal\"");
+    }
+    Ok(())
+}
