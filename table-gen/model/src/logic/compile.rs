@@ -6,13 +6,16 @@
 //! |---|---|---|
 //! | `G(f >= c)` | `requirements.containment_hz` | avoid, in every reach game |
 //! | `G(!(f in A) -> F f in A)`, also `F[<=t s]` | `requirements.outer_hz` | reach I1 |
+//! | `G F f in A`, also `F[<=t s]` | the same in other words | reach I1, again and again |
 //! | `G((f in A & !(f in B)) -> F f in B)`, also `F[<=t s]` | `requirements.inner_hz` | reach I2 |
 //! | `F f in B`, also `F[<=t s]` | the same | reach I2 |
 //! | `F G f in B`, `G(f in B -> G f in B)` | `requirements.stay` | reach, then safety |
 //! | `(loss <= c) -> φ`, `(loss >= c) -> φ` around it all | an end of `uncertainty.loss_gw` | the adversary |
 //!
-//! Bounds add up: the two reach steps follow each other, and the spec bounds their sum. Everything else is refused with
-//! the sub-formula that no game plays.
+//! `F G F φ` is read as `G F φ`, and `G F G φ` as `F G φ`, which say the same.
+//!
+//! Bounds add up: the two reach steps follow each other, and the spec bounds their sum. Everything
+//! else is refused with the sub-formula that no game plays.
 
 use super::formula::{Comparison, Formula, Interval, Signal};
 use crate::spec::Spec;
@@ -72,7 +75,8 @@ pub fn compile(formula: &Formula, spec: &Spec) -> Result<Compiled, NotSupported>
     while let Some(part) = pending.pop() {
         match part {
             Formula::And(a, b) => {
-                // The left one is looked at first, so that the first refusal is the first in the text.
+                // The left one is looked at first, so that the first refusal is the first in the
+                // text.
                 pending.push(b);
                 pending.push(a);
             }
@@ -115,6 +119,9 @@ fn conjunct(part: &Formula, spec: &Spec, out: &mut Compiled) -> Result<(), NotSu
         Formula::Eventually(within_s, of) => {
             let target = match of.as_ref() {
                 Formula::Always(None, inside) => {
+                    if let Formula::Eventually(None, again) = inside.as_ref() {
+                        return recurrent(inside, None, again, spec, out);
+                    }
                     out.stay = true;
                     inside
                 }
@@ -160,6 +167,10 @@ fn always(
             always(part, b, spec, out)
         }
         Formula::Implies(when, then) => triggered(when, then, spec, out),
+        Formula::Eventually(None, inside) if matches!(**inside, Formula::Always(None, _)) => {
+            conjunct(of, spec, out)
+        }
+        Formula::Eventually(within_s, again) => recurrent(of, *within_s, again, spec, out),
         Formula::Compare(Signal::Frequency, Comparison::AtMost, _) | Formula::In(..) => {
             Err(NotSupported::new(
                 part,
@@ -171,6 +182,19 @@ fn always(
             "under G only f >= c or a triggered reach or stay is played",
         )),
     }
+}
+
+/// `G F f in A`, of which `part` is the inside: `G(!(f in A) -> F f in A)` in other words.
+fn recurrent(
+    part: &Formula,
+    within_s: Option<f64>,
+    again: &Formula,
+    spec: &Spec,
+    out: &mut Compiled,
+) -> Result<(), NotSupported> {
+    let reached = band(again, spec)?;
+    add(&mut out.settle_within_s, within_s);
+    set(&mut out.outer_hz, reached, part)
 }
 
 /// `G(when -> then)`.
@@ -273,7 +297,8 @@ fn add(sum: &mut Option<f64>, within_s: Option<f64>) {
 }
 
 impl Compiled {
-    /// The spec with these requirements in the place of its own. It should pass [`Spec::validate`] before use.
+    /// The spec with these requirements in the place of its own. It should pass [`Spec::validate`]
+    /// before use.
     #[must_use]
     pub fn applied(&self, spec: &Spec) -> Spec {
         let mut out = spec.clone();
@@ -341,6 +366,22 @@ mod tests {
     }
 
     #[test]
+    fn again_and_again_is_a_reach_whenever_it_was_left() {
+        let of = |text: &str| compile(&parse(text).unwrap(), &paper()).unwrap();
+        for (short, long) in [
+            ("G F f in I1", "G(!(f in I1) -> F f in I1)"),
+            ("G F[<=40s] f in I1", "G(!(f in I1) -> F[<=40s] f in I1)"),
+            ("F G F f in I1", "G F f in I1"),
+            ("G F G f in I2", "F G f in I2"),
+            ("G(F f in I1 & f >= -0.8)", "G(f >= -0.8) & G F f in I1"),
+        ] {
+            assert_eq!(of(short), of(long), "{short}");
+        }
+        assert_eq!(of("G F f in [-0.2, 0]").outer_hz, Some([-0.2, 0.0]));
+        assert!(!of("G F f in I1").stay && of("G F G f in I1").stay);
+    }
+
+    #[test]
     fn what_no_game_plays_is_named() {
         let refused = |text: &str| compile(&parse(text).unwrap(), &paper()).unwrap_err().part;
         assert_eq!(refused("G(f >= -0.8) & G(f <= 0.5)"), "G(f <= 0.5)");
@@ -348,7 +389,9 @@ mod tests {
             refused("G(f >= -0.8) | F f in I1"),
             "G(f >= -0.8) | F(f in I1)"
         );
-        assert_eq!(refused("G F f in I1"), "G(F(f in I1))");
+        assert_eq!(refused("G F f >= -0.2"), "f >= -0.2");
+        assert_eq!(refused("G F f in I1 & G F f in I2"), "F(f in I2)");
+        assert_eq!(refused("G F[<=5s] G f in I2"), "G(f in I2)");
         assert_eq!(refused("f in I1 U f in I2"), "f in I1 U f in I2");
         assert_eq!(refused("G(f <= -0.4 -> F f in I1)"), "f <= -0.4");
         assert_eq!(refused("G(!(f in I1) -> F f in I2)"), "F(f in I2)");
