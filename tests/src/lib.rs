@@ -13,7 +13,9 @@ pub mod costs;
 pub mod images;
 pub mod pil;
 pub mod reference;
+pub mod scots_examples;
 pub mod stand_in;
+pub mod transition_lists;
 
 use std::path::PathBuf;
 

@@ -1,5 +1,5 @@
-//! A slow, obvious solver: every box from plain floating point, every fixed point by the definition. The oracle for the
-//! engine on small random games.
+//! A slow, obvious solver: every box from plain floating point, every fixed point by the
+//! definition. The oracle for the engine on small random games.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -41,9 +41,9 @@ impl SlowGame {
             .collect()
     }
 
-    /// The boxes of all pairs by the textbook: centre by the matrix exponential, radius by its magnitudes, disturbance
-    /// by a Riemann sum with many steps. The sum's error must be far below a cell's distance from a boundary, which
-    /// random numbers provide.
+    /// The boxes of all pairs by the textbook: centre by the matrix exponential, radius by its
+    /// magnitudes, disturbance by a Riemann sum with many steps. The sum's error must be far below
+    /// a cell's distance from a boundary, which random numbers provide.
     pub fn boxes(&self) -> Boxes {
         let n = self.axes.len();
         let phi = (&self.a * self.period).exp();
@@ -114,7 +114,7 @@ impl SlowGame {
     }
 
     /// Inputs of a cell whose box lies in a set.
-    fn mask(&self, boxes: &Boxes, cell: usize, set: &[bool]) -> u32 {
+    pub fn mask(&self, boxes: &Boxes, cell: usize, set: &[bool]) -> u32 {
         let inputs = boxes[cell].iter().enumerate();
         inputs
             .filter(|(_, ranges)| ranges.as_ref().is_some_and(|r| self.included(r, set)))

@@ -1,13 +1,14 @@
-//! The boost converter: the engine on a switched plant, against the slow solver and against the growth-bound interface.
+//! The boost converter: the engine on a switched plant, against the slow solver and against the
+//! growth-bound interface.
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on fails")]
 
 use nalgebra::{DMatrix, DVector};
 use synth::abstraction::Abstraction;
 use synth::abstraction::growth::{GrowthAbstraction, GrowthBound};
-use synth::boost_converter::{self, PERIOD_S};
 use synth::game::bitset::BitSet;
 use synth::game::guard::Unguarded;
 use synth::game::{Unwatched, safety::safety};
+use synth::yardsticks::boost_converter::{self, PERIOD_S};
 use tests::reference::SlowGame;
 
 const CELLS: u32 = 60;

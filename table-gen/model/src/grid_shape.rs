@@ -1,7 +1,8 @@
-//! The grid as the engine sees it: real edges, widths and counts on up to six axes, first axis fastest.
+//! The grid as the engine sees it: real edges, widths and counts on up to six axes, first axis
+//! fastest.
 //!
-//! For the charger's plant it is read off [`firmware::grid::Grid`], whose integers are the truth; other plants give it
-//! directly.
+//! For the charger's plant it is read off [`firmware::grid::Grid`], whose integers are the truth;
+//! other plants give it directly.
 
 /// A uniform grid.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -46,6 +47,25 @@ impl<const D: usize> GridShape<D> {
             index /= self.count[d] as usize;
         }
         cell
+    }
+
+    /// Positions of the cells of a box, both ends included, in the dense order.
+    pub fn indices(&self, low: [u32; D], high: [u32; D]) -> impl Iterator<Item = usize> + '_ {
+        let mut next = Some(low);
+        std::iter::from_fn(move || {
+            let cell = next?;
+            let mut after = cell;
+            next = None;
+            for d in 0..D {
+                if after[d] < high[d] {
+                    after[d] += 1;
+                    next = Some(after);
+                    break;
+                }
+                after[d] = low[d];
+            }
+            Some(self.index(cell))
+        })
     }
 
     /// Interval `[low, high]` of a cell on an axis.

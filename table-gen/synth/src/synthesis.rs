@@ -6,11 +6,13 @@
 //! | C2 | reach-avoid | whole cells in I2 | if I2 is smaller than I1 |
 //! | Hold | safety | stay in whole cells in I2 | `stay = true`; then C2, or C1 if there is no C2, reaches Hold's kernel |
 //!
-//! "Avoid" is every cell of which any part lies below containment. With a measurement error e, the cell is that of the
-//! estimate: the real frequency may lie e outside it, so bands shrink and containment rises by e. Where commands act with a delay,
-//! the cell is that of the prediction ([`crate::delay`]), and e that of the prediction.
+//! "Avoid" is every cell of which any part lies below containment. With a measurement error e, the
+//! cell is that of the estimate: the real frequency may lie e outside it, so bands shrink and
+//! containment rises by e. Where commands act with a delay, the cell is that of the prediction
+//! ([`crate::delay`]), and e that of the prediction.
 //!
-//! All numbers of the abstraction are in the device's micro-units, so that the edges of the cells are exact.
+//! All numbers of the abstraction are in the device's micro-units, so that the edges of the cells
+//! are exact.
 
 use std::time::Instant;
 
@@ -22,9 +24,12 @@ use crate::abstraction::affine::{AbstractionError, AffineAbstraction, AffineInpu
 use crate::abstraction::tube::TubeGuard;
 use crate::delay::{Delay, DelayError, known_within};
 use crate::game::bitset::BitSet;
+use crate::game::exchange::{Alone, Exchange};
 use crate::game::guard::Guard;
-use crate::game::reach::{may_reach, reach};
-use crate::game::{GameError, LastCells, Solution, Watch, safety::safety};
+use crate::game::reach::{may_reach, reach_shared};
+use crate::game::{GameError, LastCells, Solution, Watch, safety::safety_shared};
+use crate::ranks::slab::{Slab, WindowGuard};
+use crate::ranks::{Slabs, Transport};
 use crate::usage;
 use model::grid_shape::GridShape;
 use model::interval::Interval;
@@ -60,6 +65,20 @@ pub struct Synthesis {
     pub hold: Option<SolvedLaw>,
     /// Processor time of the abstraction's tables \[s\].
     pub abstraction_cpu_s: f64,
+}
+
+impl Synthesis {
+    /// The laws with their names.
+    pub fn all(&self) -> Vec<(&'static str, &SolvedLaw)> {
+        let others = [("C2", &self.c2), ("Hold", &self.hold)];
+        let mut all = vec![("C1", &self.c1)];
+        all.extend(
+            others
+                .into_iter()
+                .filter_map(|(name, law)| Some((name, law.as_ref()?))),
+        );
+        all
+    }
 }
 
 /// Why there are no laws.
@@ -118,8 +137,8 @@ pub fn grid_shape(grid: &Grid) -> GridShape<STATES> {
     }
 }
 
-/// Net power `P u' - w` \[µGW\] under a commanded participation: u' within the participation error, at most the whole
-/// fleet, and w within its band.
+/// Net power `P u' - w` \[µGW\] under a commanded participation: u' within the participation error,
+/// at most the whole fleet, and w within its band.
 pub fn net_power(spec: &Spec, level: usize) -> Interval {
     let fleet = Interval::point(spec.fleet_power_gw()) * Interval::point(MICRO);
     let u = Interval::point(spec.input.value(level));
@@ -182,7 +201,8 @@ pub fn abstraction(spec: &Spec, grid: &Grid) -> Result<AffineAbstraction<STATES>
     )?)
 }
 
-/// The guard of a band \[µHz\], if the spec asks for the time between the samples and the band has an end.
+/// The guard of a band \[µHz\], if the spec asks for the time between the samples and the band has
+/// an end.
 fn between_samples(
     spec: &Spec,
     grid: &Grid,
@@ -202,7 +222,8 @@ fn between_samples(
     ))))
 }
 
-/// The guard of C1 and C2: f stays above containment between the samples too, if the spec asks for it.
+/// The guard of C1 and C2: f stays above containment between the samples too, if the spec asks for
+/// it.
 ///
 /// # Errors
 /// A delay that the device cannot predict over.
@@ -240,7 +261,8 @@ impl Guard<STATES> for OptionalGuard {
 /// Containment \[µHz\], rounded up if it is no whole number of them.
 fn containment_micro(hz: f64) -> f64 {
     let micro = hz * MICRO;
-    // The product of a decimal and 1e6 may miss a whole number by a rounding; a thousandth of a µHz decides.
+    // The product of a decimal and 1e6 may miss a whole number by a rounding; a thousandth of a µHz
+    // decides.
     if (micro - micro.round()).abs() < 1e-3 {
         micro.round()
     } else {
@@ -249,15 +271,14 @@ fn containment_micro(hz: f64) -> f64 {
 }
 
 /// Cells whose whole frequency interval, widened by the measurement error, lies in a band \[µHz\].
-fn cells_within(grid: &Grid, low: f64, high: f64, error: f64) -> BitSet {
-    by_frequency(grid, |cell_low, cell_high| {
+fn cells_within(shape: &GridShape<STATES>, low: f64, high: f64, error: f64) -> BitSet {
+    by_frequency(shape, |cell_low, cell_high| {
         cell_low - error >= low && cell_high + error <= high
     })
 }
 
 /// Cells chosen by their frequency interval \[µHz\].
-fn by_frequency(grid: &Grid, choose: impl Fn(f64, f64) -> bool) -> BitSet {
-    let shape = grid_shape(grid);
+fn by_frequency(shape: &GridShape<STATES>, choose: impl Fn(f64, f64) -> bool) -> BitSet {
     let row: Vec<bool> = (0..shape.count[0])
         .map(|f| {
             let (low, high) = shape.interval(0, f);
@@ -276,7 +297,8 @@ fn by_frequency(grid: &Grid, choose: impl Fn(f64, f64) -> bool) -> BitSet {
 /// Plays the games of a spec. `watch` is asked for an observer of each game by its name.
 ///
 /// # Errors
-/// A grid or abstraction that cannot be, an empty target, an empty kernel or winning set, or an interruption.
+/// A grid or abstraction that cannot be, an empty target, an empty kernel or winning set, or an
+/// interruption.
 pub fn synthesise<'w>(
     spec: &Spec,
     watch: &dyn Fn(&'static str) -> Box<dyn Watch + 'w>,
@@ -287,26 +309,105 @@ pub fn synthesise<'w>(
     let grid = device_grid(spec).map_err(SynthesisError::Grid)?;
     let before = usage::cpu_s();
     let abstraction = abstraction(spec, &grid)?;
+    let guards = [containment_guard(spec, &grid)?, stay_guard(spec, &grid)?];
+    let abstraction_cpu_s = usage::cpu_s() - before;
+    let laws = play_laws(spec, &abstraction, &guards, &Alone, watch)?;
+    Ok(laws.on(grid, abstraction_cpu_s))
+}
+
+/// What a rank has of a synthesis that several play.
+#[derive(Debug, Clone)]
+pub struct SharedSynthesis {
+    /// The laws in this rank's window; counts are those of the whole grid.
+    pub laws: Synthesis,
+    /// Own cells within the window.
+    pub own: std::ops::Range<usize>,
+    /// Cells of a layer of the grid, of which the window and the own cells are made.
+    pub layer: usize,
+    /// Bytes that this rank sent to others after sweeps.
+    pub sent_bytes: u64,
+}
+
+/// Plays the games of a spec together with other ranks, each in a slab of the grid. Every rank
+/// calls it with the same spec.
+///
+/// # Errors
+/// As [`synthesise`], or a rank that is gone.
+pub fn synthesise_shared<'w>(
+    spec: &Spec,
+    transport: &impl Transport,
+    watch: &dyn Fn(&'static str) -> Box<dyn Watch + 'w>,
+) -> Result<SharedSynthesis, SynthesisError> {
+    let grid = device_grid(spec).map_err(SynthesisError::Grid)?;
+    let before = usage::cpu_s();
+    let whole = abstraction(spec, &grid)?;
+    let guards = [containment_guard(spec, &grid)?, stay_guard(spec, &grid)?];
+    let slab = Slab::new(&whole, transport.rank(), transport.ranks());
+    let part = slab.part();
+    let slabs = Slabs::new(transport, &part).map_err(|lost| SynthesisError::Game {
+        game: "the slabs",
+        error: lost.into(),
+    })?;
+    let guards = guards
+        .each_ref()
+        .map(|guard| WindowGuard::new(guard, &slab));
+    let abstraction_cpu_s = usage::cpu_s() - before;
+    let laws = play_laws(spec, &slab, &guards, &slabs, watch)?;
+    Ok(SharedSynthesis {
+        laws: laws.on(grid, abstraction_cpu_s),
+        own: slabs.owned(part.window.len()),
+        layer: slab.shape().strides()[STATES - 1],
+        sent_bytes: slabs.sent_bytes(),
+    })
+}
+
+/// The laws of a spec, before they are put beside their grid.
+struct Laws {
+    c1: SolvedLaw,
+    c2: Option<SolvedLaw>,
+    hold: Option<SolvedLaw>,
+}
+
+impl Laws {
+    fn on(self, grid: Grid, abstraction_cpu_s: f64) -> Synthesis {
+        Synthesis {
+            grid,
+            c1: self.c1,
+            c2: self.c2,
+            hold: self.hold,
+            abstraction_cpu_s,
+        }
+    }
+}
+
+/// Plays the games in a window of the grid: the whole, or a rank's. The guards are those of
+/// containment and of Hold.
+fn play_laws<'w, A: Abstraction<STATES, Inputs = u32>, G: Guard<STATES>>(
+    spec: &Spec,
+    abstraction: &A,
+    [contained, stay]: &[G; 2],
+    exchange: &dyn Exchange,
+    watch: &dyn Fn(&'static str) -> Box<dyn Watch + 'w>,
+) -> Result<Laws, SynthesisError> {
+    let shape = abstraction.shape();
     let requirements = &spec.requirements;
     let containment = requirements.containment_hz.map(containment_micro);
-    let contained = containment_guard(spec, &grid)?;
-    let abstraction_cpu_s = usage::cpu_s() - before;
     let error = known_within(spec)?[AXIS_F];
     let [outer_low, outer_high] = requirements.outer_micro().map(f64::from);
     let [inner_low, inner_high] = requirements.inner_micro().map(f64::from);
-    let outer = cells_within(&grid, outer_low, outer_high, error);
-    let inner = cells_within(&grid, inner_low, inner_high, error);
+    let outer = cells_within(shape, outer_low, outer_high, error);
+    let inner = cells_within(shape, inner_low, inner_high, error);
     let avoid = match containment {
         None => BitSet::new(outer.len()),
-        // A cell counts as contained only if its lower end, less the error, is at or above the limit.
-        Some(limit) => by_frequency(&grid, |low, _| low - error < limit),
+        // A cell counts as contained only if its lower end, less the error, is at or above the
+        // limit.
+        Some(limit) => by_frequency(shape, |low, _| low - error < limit),
     };
     let hold = if requirements.stay {
-        let stay = stay_guard(spec, &grid)?;
         let mut last = 0;
-        let law = solve("Hold", watch, |watch| {
+        let law = solve("Hold", exchange, watch, |watch| {
             let watch = LastCells::new(watch);
-            let solution = safety(&abstraction, &inner, &stay, &watch);
+            let solution = safety_shared(abstraction, &inner, stay, exchange, &watch);
             last = watch.last();
             solution
         })?;
@@ -332,8 +433,8 @@ pub fn synthesise<'w>(
     let kernel = hold.as_ref().map(|law| law.solution.winning_set(true));
     let same = requirements.outer_micro() == requirements.inner_micro();
     let play = |name, target: &BitSet| {
-        let law = solve(name, watch, |watch| {
-            reach(&abstraction, target, &avoid, &contained, watch)
+        let law = solve(name, exchange, watch, |watch| {
+            reach_shared(abstraction, (target, &avoid), contained, exchange, watch)
         })?;
         if law.solution.winning == 0 {
             return Err(SynthesisError::NoController {
@@ -343,7 +444,7 @@ pub fn synthesise<'w>(
                      with an input that may do so",
                     goal(name, &kernel),
                     law.target_cells,
-                    may_reach(&abstraction, target, &avoid),
+                    may_reach(abstraction, target, &avoid),
                 ),
             });
         }
@@ -369,13 +470,7 @@ pub fn synthesise<'w>(
         }
     };
     let c1 = play("C1", &c1_target)?;
-    Ok(Synthesis {
-        grid,
-        c1,
-        c2,
-        hold,
-        abstraction_cpu_s,
-    })
+    Ok(Laws { c1, c2, hold })
 }
 
 /// The requirement that a reach game is for, by its key.
@@ -390,13 +485,19 @@ fn goal(game: &str, kernel: &Option<BitSet>) -> &'static str {
 
 fn solve<'w>(
     game: &'static str,
+    exchange: &dyn Exchange,
     watch: &dyn Fn(&'static str) -> Box<dyn Watch + 'w>,
     play: impl FnOnce(&dyn Watch) -> Result<Solution, GameError>,
 ) -> Result<SolvedLaw, SynthesisError> {
     let (cpu, wall) = (usage::cpu_s(), Instant::now());
+    let failed = |error| SynthesisError::Game { game, error };
     let watch = watch(game);
-    let solution = play(watch.as_ref()).map_err(|error| SynthesisError::Game { game, error })?;
-    let target_cells = solution.ranks.iter().filter(|rank| **rank == 0).count();
+    let solution = play(watch.as_ref()).map_err(failed)?;
+    let own = exchange.owned(solution.ranks.len());
+    let targets = solution.ranks[own].iter().filter(|rank| **rank == 0);
+    let target_cells = exchange
+        .sum(targets.count())
+        .map_err(|lost| failed(lost.into()))?;
     Ok(SolvedLaw {
         solution,
         target_cells,
@@ -405,8 +506,26 @@ fn solve<'w>(
     })
 }
 
-/// Transitions of the abstraction: cells in the boxes of all allowed pairs. A count for comparison with tools that store
-/// them; nothing else needs it.
+/// A checksum of each layer of a solution's own cells, masks and ranks: the same on any number of
+/// ranks and threads.
+pub fn layer_sums(solution: &Solution, own: std::ops::Range<usize>, layer: usize) -> Vec<u64> {
+    let crc = crc::Crc::<u64>::new(&crc::CRC_64_ECMA_182);
+    let masks = solution.masks[own.clone()].chunks(layer);
+    masks
+        .zip(solution.ranks[own].chunks(layer))
+        .map(|(masks, ranks)| {
+            let mut digest = crc.digest();
+            for (mask, rank) in masks.iter().zip(ranks) {
+                digest.update(&mask.to_le_bytes());
+                digest.update(&rank.to_le_bytes());
+            }
+            digest.finalize()
+        })
+        .collect()
+}
+
+/// Transitions of the abstraction: cells in the boxes of all allowed pairs. A count for comparison
+/// with tools that store them; nothing else needs it.
 pub fn count_transitions<const D: usize, A: Abstraction<D>>(abstraction: &A) -> u64 {
     use rayon::prelude::*;
     let shape = abstraction.shape();

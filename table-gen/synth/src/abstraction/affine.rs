@@ -1,20 +1,24 @@
-//! Abstraction of a switched affine system `x' = A_m x + b v(t)`, where an input chooses the mode m and the interval in
-//! which the drive v may vary.
+//! Abstraction of a switched affine system `x' = A_m x + b v(t)`, where an input chooses the mode m
+//! and the interval in which the drive v may vary.
 //!
-//! The successor of a cell is a box whose centre is affine in the cell's index and whose radius depends on the input
-//! alone. So a box needs one sum of table entries on each axis, in fixed point with 40 fractional bits of a cell:
+//! The successor of a cell is a box whose centre is affine in the cell's index and whose radius
+//! depends on the input alone. So a box needs one sum of table entries on each axis, in fixed point
+//! with 40 fractional bits of a cell:
 //!
 //! ```text
-//! low_d  = floor(Σ_j T_dj[c_j] + offset_d(u))          high_d = floor(Σ_j T_dj[c_j] + offset_d(u) + span_d(u))
+//! low_d  = floor(Σ_j T_dj[c_j] + offset_d(u))          high_d = floor(Σ_j T_dj[c_j] + offset_d(u)
+//! + span_d(u))
 //! ```
 //!
-//! **Rounding.** Φ, Γ and the absolute integrals are intervals that contain the exact values. Each table entry is the
-//! middle of an interval, rounded to fixed point; the entry's largest error over the axis (half the interval plus half a
-//! unit) is added to the radius, and the offset and span are rounded outward. Sums of i64 are exact. So the box contains
-//! the real successors, whatever the cell.
+//! **Rounding.** Φ, Γ and the absolute integrals are intervals that contain the exact values. Each
+//! table entry is the middle of an interval, rounded to fixed point; the entry's largest error over
+//! the axis (half the interval plus half a unit) is added to the radius, and the offset and span
+//! are rounded outward. Sums of i64 are exact. So the box contains the real successors, whatever
+//! the cell.
 //!
-//! **Errors of the estimate.** The cell that the controller sees may differ from the real state by e on each axis. The
-//! real state before the step lies in the cell widened by e; the estimate after it in the successor widened by e again.
+//! **Errors of the estimate.** The cell that the controller sees may differ from the real state by
+//! e on each axis. The real state before the step lies in the cell widened by e; the estimate after
+//! it in the successor widened by e again.
 
 mod blocks;
 
@@ -104,7 +108,8 @@ pub enum AbstractionError {
     },
 }
 
-/// Tables of one mode: `tables[d][j][i]` is what cell index i on axis j adds to the successor's lower end on axis d.
+/// Tables of one mode: `tables[d][j][i]` is what cell index i on axis j adds to the successor's
+/// lower end on axis d.
 #[derive(Debug, Clone)]
 struct Mode<const D: usize> {
     a: Matrix<D>,
@@ -138,7 +143,8 @@ pub struct AffineAbstraction<const D: usize> {
 }
 
 impl<const D: usize> AffineAbstraction<D> {
-    /// Builds the abstraction for a period \[s\] and an error of the estimate on each axis \[plant units\].
+    /// Builds the abstraction for a period \[s\] and an error of the estimate on each axis \[plant
+    /// units\].
     ///
     /// # Errors
     /// Bad widths, inputs or period, or a plant that leaves the fixed point's range in one step.
@@ -156,8 +162,9 @@ impl<const D: usize> AffineAbstraction<D> {
         Self::with_drifts(shape, inputs, period_s, growth, errors, None)
     }
 
-    /// The same with errors of its own before and after the step, and with what each input adds over the step where that is not
-    /// the response to the input's own drive (commands that act late).
+    /// The same with errors of its own before and after the step, and with what each input adds
+    /// over the step where that is not the response to the input's own drive (commands that act
+    /// late).
     ///
     /// # Errors
     /// As [`AffineAbstraction::new`].
@@ -224,7 +231,8 @@ impl<const D: usize> AffineAbstraction<D> {
         Ok(abstraction)
     }
 
-    /// Radius of the successor box of every cell under an input, before rounding to cells \[plant units\].
+    /// Radius of the successor box of every cell under an input, before rounding to cells \[plant
+    /// units\].
     pub fn radius(&self, input: usize) -> [f64; D] {
         let step = &self.steps[input];
         let mut radius = [0.0; D];
@@ -380,6 +388,7 @@ pub struct AffineAnchor<const D: usize> {
 
 impl<const D: usize> Abstraction<D> for AffineAbstraction<D> {
     type Anchor = AffineAnchor<D>;
+    type Inputs = u32;
 
     fn shape(&self) -> &GridShape<D> {
         &self.shape

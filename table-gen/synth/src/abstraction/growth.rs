@@ -1,8 +1,8 @@
-//! Abstraction of any plant with a growth bound, as in SCOTS: the successor of a cell lies around the successor of its
-//! centre, within a radius that the plant bounds.
+//! Abstraction of any plant with a growth bound, as in SCOTS: the successor of a cell lies around
+//! the successor of its centre, within a radius that the plant bounds.
 //!
-//! The plant is responsible for soundness: [`GrowthBound::centre`] and [`GrowthBound::radius`] together must enclose
-//! every successor of the cell under every disturbance, rounding included.
+//! The plant is responsible for soundness: [`GrowthBound::centre`] and [`GrowthBound::radius`]
+//! together must enclose every successor of the cell under every disturbance, rounding included.
 
 use super::{Abstraction, CellBox};
 use model::grid_shape::GridShape;
@@ -19,7 +19,8 @@ pub trait GrowthBound<const D: usize>: Sync {
     fn radius(&self, x: [f64; D], r: [f64; D], input: usize) -> [f64; D];
 }
 
-/// The abstraction of a plant with a growth bound. It prepares nothing, so it is slow; it serves non-linear plants.
+/// The abstraction of a plant with a growth bound. It prepares nothing, so it is slow; it serves
+/// non-linear plants.
 #[derive(Debug, Clone)]
 pub struct GrowthAbstraction<P, const D: usize> {
     shape: GridShape<D>,
@@ -35,6 +36,7 @@ impl<P: GrowthBound<D>, const D: usize> GrowthAbstraction<P, D> {
 
 impl<P: GrowthBound<D>, const D: usize> Abstraction<D> for GrowthAbstraction<P, D> {
     type Anchor = [f64; D];
+    type Inputs = u32;
 
     fn shape(&self) -> &GridShape<D> {
         &self.shape

@@ -1,13 +1,17 @@
-//! The finite abstraction: a uniform grid, a finite input set, and for every (cell, input) a box of cells that contains
-//! every real successor.
+//! The finite abstraction: a uniform grid, a finite input set, and for every (cell, input) a box of
+//! cells that contains every real successor.
 //!
-//! The games know nothing else of the plant. [`affine`] is the abstraction of (switched) affine systems, exact but for
-//! rounding; [`growth`] that of any system with a growth bound. A pair whose box leaves the grid is not allowed.
+//! The games know nothing else of the plant. [`affine`] is the abstraction of (switched) affine
+//! systems, exact but for rounding; [`growth`] that of any system with a growth bound, and
+//! [`invariant`] the same for one that moves alike everywhere. A pair whose box leaves the grid is
+//! not allowed.
 
 pub mod affine;
 pub mod growth;
+pub mod invariant;
 pub mod tube;
 
+use crate::game::inputs::InputSet;
 use model::grid_shape::GridShape;
 
 /// A box of cells, both ends included.
@@ -57,17 +61,20 @@ pub trait Abstraction<const D: usize>: Sync {
     /// What is computed once for a cell and shared by all its inputs.
     type Anchor;
 
+    /// Sets of its inputs.
+    type Inputs: InputSet;
+
     /// The grid.
     fn shape(&self) -> &GridShape<D>;
 
-    /// Number of inputs, 1..=32.
+    /// Number of inputs, at least 1 and at most what [`Abstraction::Inputs`] holds.
     fn inputs(&self) -> usize;
 
     /// Prepares a cell for [`Abstraction::successor`].
     fn anchor(&self, cell: [u32; D]) -> Self::Anchor;
 
-    /// The box of cells that contains every successor of the anchored cell under an input, or `None` if that box leaves
-    /// the grid.
+    /// The box of cells that contains every successor of the anchored cell under an input, or
+    /// `None` if that box leaves the grid.
     fn successor(&self, anchor: &Self::Anchor, input: usize) -> Option<CellBox<D>>;
 
     /// Sizes that the boxes can have, if there are few enough to prepare for each.
@@ -86,16 +93,16 @@ pub trait Abstraction<const D: usize>: Sync {
         BlockCore::Unknown
     }
 
-    /// A box that contains every successor of the block under an input, or under all, clipped to the grid; `None` if
-    /// there is none. The default knows only the grid.
+    /// A box that contains every successor of the block under an input, or under all, clipped to
+    /// the grid; `None` if there is none. The default knows only the grid.
     fn block_hull(&self, first: &Self::Anchor, input: Option<usize>) -> Option<CellBox<D>> {
         let _ = (first, input);
         let high = self.shape().count.map(|n| n - 1);
         Some(CellBox { low: [0; D], high })
     }
 
-    /// Cells on each axis of the groups for which [`Abstraction::group_hull`] answers: a multiple of
-    /// [`Abstraction::block`] on every axis.
+    /// Cells on each axis of the groups for which [`Abstraction::group_hull`] answers: a multiple
+    /// of [`Abstraction::block`] on every axis.
     fn group(&self) -> [u32; D] {
         self.block()
     }
@@ -105,8 +112,8 @@ pub trait Abstraction<const D: usize>: Sync {
         self.block_hull(first, None)
     }
 
-    /// Sizes of the boxes that [`Abstraction::block_core`] and the hulls answer with, if each has one size for all blocks
-    /// and inputs.
+    /// Sizes of the boxes that [`Abstraction::block_core`] and the hulls answer with, if each has
+    /// one size for all blocks and inputs.
     fn block_extents(&self) -> Option<BlockExtents<D>> {
         None
     }

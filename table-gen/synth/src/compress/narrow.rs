@@ -1,10 +1,11 @@
 //! `table.domain = "reachable"`: only what the closed loop asks for.
 //!
-//! A simple controller is fixed first: the best affine law wherever the game, ranked by that law, allows it, else the
-//! nearest allowed level. The closed loop with it is explored; its cells must be covered and get the controller's very
-//! levels, or, where whole cells were explored, any allowed level whose box stays among them: so the loop stays within
-//! what was explored. All other cells are free, as long as no answer is wrong: a cell may
-//! be covered if the answer there is one that the game allows. So both parts shrink to a few bytes.
+//! A simple controller is fixed first: the best affine law wherever the game, ranked by that law,
+//! allows it, else the nearest allowed level. The closed loop with it is explored; its cells must
+//! be covered and get the controller's very levels, or, where whole cells were explored, any
+//! allowed level whose box stays among them: so the loop stays within what was explored. All other
+//! cells are free, as long as no answer is wrong: a cell may be covered if the answer there is one
+//! that the game allows. So both parts shrink to a few bytes.
 
 use firmware::grid::Cell;
 use firmware::table::{AffineFunction, Law};
@@ -25,9 +26,11 @@ use crate::game::inclusion::Inclusion;
 use crate::game::reach::included;
 use model::plant::STATES;
 
-/// Cells of a grid up to which membership looks at all of them; past that only at the box around the reachable ones.
+/// Cells of a grid up to which membership looks at all of them; past that only at the box around
+/// the reachable ones.
 const CELLS_ALL_MAX: usize = 4_000_000;
-/// Most nodes on a path of a membership tree, well above the bits of the four axes, below which boxes are only halved.
+/// Most nodes on a path of a membership tree, well above the bits of the four axes, below which
+/// boxes are only halved.
 const DEPTH_MAX: u32 = 40;
 
 /// A law with a fixed controller.
@@ -91,13 +94,14 @@ impl Controller {
         )
     }
 
-    /// Inputs and domain for the cells that are asked for; `closed` answers for the set in which boxes must stay.
+    /// Inputs and domain for the cells that are asked for; `closed` answers for the set in which
+    /// boxes must stay.
     ///
     /// # Errors
     /// A tree that the format cannot hold.
     pub fn narrow(
         &self,
-        abstraction: &impl Abstraction<STATES>,
+        abstraction: &impl Abstraction<STATES, Inputs = u32>,
         asked: &BitSet,
         closed: Option<&Inclusion<STATES>>,
         depth_max: u32,

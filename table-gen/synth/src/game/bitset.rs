@@ -1,8 +1,9 @@
 //! A set of cells as bits in the dense order, and its erosion along the axes.
 //!
-//! The bits are one flat string: moving by one cell along axis d moves by a fixed number of bits. A shifted AND of the
-//! whole string therefore erodes all rows at once. Bits that the shift carries across the end of a row are wrong, but
-//! they belong to boxes that leave the grid, and no query asks for those.
+//! The bits are one flat string: moving by one cell along axis d moves by a fixed number of bits. A
+//! shifted AND of the whole string therefore erodes all rows at once. Bits that the shift carries
+//! across the end of a row are wrong, but they belong to boxes that leave the grid, and no query
+//! asks for those.
 
 /// A set of cells.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -16,8 +17,50 @@ impl BitSet {
     pub fn new(bits: usize) -> Self {
         // One spare word, so that an unaligned read needs no special case at the end.
         Self {
-            words: vec![0; bits.div_ceil(64) + 1],
+            words: vec![0; Self::words_for(bits)],
             bits,
+        }
+    }
+
+    /// Words of a set over a number of cells, the spare one among them.
+    pub(super) fn words_for(bits: usize) -> usize {
+        bits.div_ceil(64) + 1
+    }
+
+    /// From its words: those of [`BitSet::words_for`], without a bit past the last cell.
+    pub(super) fn of_words(words: Vec<u64>, bits: usize) -> Self {
+        Self { words, bits }
+    }
+
+    /// The words, 64 cells each, in the dense order.
+    pub(super) fn words(&self) -> &[u64] {
+        &self.words
+    }
+
+    /// A run of cells, 64 to a word, from its first cell on.
+    pub(crate) fn part(&self, from: usize, len: usize) -> Vec<u64> {
+        let (first, shift) = (from / 64, from % 64);
+        let word = |at: usize| {
+            let next = self.words.get(first + at + 1).copied().unwrap_or(0);
+            (self.words[first + at] >> shift) | (next << 1 << (63 - shift))
+        };
+        let mut words: Vec<u64> = (0..len.div_ceil(64)).map(word).collect();
+        if let Some(last) = words.last_mut()
+            && !len.is_multiple_of(64)
+        {
+            *last &= u64::MAX >> (64 - len % 64);
+        }
+        words
+    }
+
+    /// Adds the cells of a run that [`BitSet::part`] gave.
+    pub(crate) fn add_part(&mut self, from: usize, words: &[u64]) {
+        let (first, shift) = (from / 64, from % 64);
+        for (at, word) in words.iter().enumerate() {
+            self.words[first + at] |= word << shift;
+            if let Some(next) = self.words.get_mut(first + at + 1) {
+                *next |= word >> 1 >> (63 - shift);
+            }
         }
     }
 
@@ -90,6 +133,21 @@ impl BitSet {
         }
     }
 
+    /// Removes the cells of another set over the same universe.
+    pub fn subtract(&mut self, other: &Self) {
+        for (word, theirs) in self.words.iter_mut().zip(&other.words) {
+            *word &= !theirs;
+        }
+    }
+
+    /// Whether every cell is in another set over the same universe.
+    pub fn is_subset(&self, other: &Self) -> bool {
+        self.words
+            .iter()
+            .zip(&other.words)
+            .all(|(mine, theirs)| mine & !theirs == 0)
+    }
+
     /// Whether the `len` cells from `index` on are all in the set.
     #[inline]
     pub fn all_ones(&self, index: usize, len: usize) -> bool {
@@ -110,7 +168,8 @@ impl BitSet {
         }
     }
 
-    /// Keeps the cells whose `extent` neighbours from themselves on, a stride apart, are all in the set.
+    /// Keeps the cells whose `extent` neighbours from themselves on, a stride apart, are all in the
+    /// set.
     pub fn erode(&mut self, stride: usize, extent: u32) {
         let mut have = 1;
         while have < extent {
@@ -186,6 +245,12 @@ mod tests {
             }
             if start + len <= bits.len() {
                 prop_assert_eq!(set.all_ones(start, len), (start..start + len).all(get));
+            }
+            let (from, run) = (start.min(bits.len()), len.min(bits.len() - start.min(bits.len())));
+            let mut copy = BitSet::new(bits.len());
+            copy.add_part(from, &set.part(from, run));
+            for i in 0..bits.len() {
+                prop_assert_eq!(copy.contains(i), get(i) && (from..from + run).contains(&i));
             }
             prop_assert_eq!(set.count(), bits.iter().filter(|b| **b).count());
             prop_assert_eq!(set.complement().count(), bits.len() - set.count());

@@ -1,9 +1,13 @@
-//! Blocks of neighbouring cells, groups of blocks, and which of them and of their inputs are worth a look in a sweep.
+//! Blocks of neighbouring cells, groups of blocks, and which of them and of their inputs are worth
+//! a look in a sweep.
+
+use std::sync::atomic::{AtomicU16, Ordering::Relaxed};
 
 use rayon::prelude::*;
 
 use super::bitset::BitSet;
 use super::inclusion::Inclusion;
+use super::inputs::InputSet;
 use crate::abstraction::{Abstraction, BlockCore, Extents};
 use model::grid_shape::GridShape;
 
@@ -43,9 +47,9 @@ impl<const D: usize> Blocks<D> {
         product(self.count)
     }
 
-    /// Runs over all groups in parallel: `enter` is told the first cell of a group and says whether to look at its blocks;
-    /// `visit` is told a block's index and first cell. Every task collects in a value of its own; they come in
-    /// the order of the groups.
+    /// Runs over all groups in parallel: `enter` is told the first cell of a group and says whether
+    /// to look at its blocks; `visit` is told a block's index and first cell. Every task collects
+    /// in a value of its own; they come in the order of the groups.
     pub fn sweep<T: Default + Send>(
         &self,
         enter: impl Fn([u32; D]) -> bool + Sync,
@@ -93,21 +97,17 @@ impl<const D: usize> Blocks<D> {
     }
 
     /// Cells of each block for which the predicate holds.
-    pub fn count_cells(&self, holds: impl Fn(usize) -> bool + Sync) -> Vec<u16> {
-        let mut counts = vec![0; self.total()];
-        let found = self.sweep(
+    pub fn count_cells(&self, holds: impl Fn(usize) -> bool + Sync) -> Vec<AtomicU16> {
+        let mut counts = Vec::new();
+        counts.resize_with(self.total(), AtomicU16::default);
+        self.sweep(
             |_| true,
-            |block, first, out: &mut Vec<(usize, u16)>| {
+            |block, first, (): &mut ()| {
                 let mut count = 0u16;
                 self.each_cell(first, |_, index| count += u16::from(holds(index)));
-                if count > 0 {
-                    out.push((block, count));
-                }
+                counts[block].store(count, Relaxed);
             },
         );
-        for (block, count) in found.into_iter().flatten() {
-            counts[block] = count;
-        }
         counts
     }
 }
@@ -116,8 +116,8 @@ fn product<const D: usize>(counts: [u32; D]) -> usize {
     counts.iter().map(|n| *n as usize).product()
 }
 
-/// Calls for every position of a box that starts at `first` within a grid of `count`, with its dense index; what sticks
-/// out of the grid is left out.
+/// Calls for every position of a box that starts at `first` within a grid of `count`, with its
+/// dense index; what sticks out of the grid is left out.
 #[inline]
 fn each_in<const D: usize>(
     count: [u32; D],
@@ -185,11 +185,15 @@ impl<const D: usize> Dirty<D> {
             };
             Inclusion::new(abstraction.shape(), &unchanged, Some(sizes))
         };
+        let (of_input, (of_block, of_group)) = rayon::join(
+            || of_size(extents.hull),
+            || rayon::join(|| of_size(extents.hull_of_all), || of_size(extents.group)),
+        );
         Self {
             unchanged: Some(Unchanged {
-                of_input: of_size(extents.hull),
-                of_block: of_size(extents.hull_of_all),
-                of_group: of_size(extents.group),
+                of_input,
+                of_block,
+                of_group,
             }),
         }
     }
@@ -203,9 +207,10 @@ pub struct Filter<const D: usize> {
 }
 
 impl<const D: usize> Filter<D> {
-    /// A filter for a sweep against `set`. With `need_core` an input is passed over if the shared part of the block's
-    /// boxes is not in the set: right where a cell needs the whole box (reach), and where a cell keeps an input only
-    /// while the whole box is in (safety asks the opposite question and does without).
+    /// A filter for a sweep against `set`. With `need_core` an input is passed over if the shared
+    /// part of the block's boxes is not in the set: right where a cell needs the whole box (reach),
+    /// and where a cell keeps an input only while the whole box is in (safety asks the opposite
+    /// question and does without).
     pub fn new<A: Abstraction<D>>(
         abstraction: &A,
         set: &BitSet,
@@ -226,8 +231,8 @@ impl<const D: usize> Filter<D> {
         Self { dirty, core }
     }
 
-    /// Whether something changed in the hull of the group that starts at a cell. No pair of a group whose hull misses the
-    /// grid is allowed, so nothing ever changes there.
+    /// Whether something changed in the hull of the group that starts at a cell. No pair of a group
+    /// whose hull misses the grid is allowed, so nothing ever changes there.
     #[inline]
     pub fn group<A: Abstraction<D>>(&self, abstraction: &A, first: [u32; D]) -> bool {
         let Some(unchanged) = &self.dirty.unchanged else {
@@ -239,17 +244,17 @@ impl<const D: usize> Filter<D> {
             .is_some_and(|hull| !unchanged.of_group.includes(&hull))
     }
 
-    /// Bit mask of the inputs of the block that are worth a look.
+    /// The inputs of the block that are worth a look.
     #[inline]
-    pub fn inputs<A: Abstraction<D>>(&self, abstraction: &A, first: [u32; D]) -> u32 {
+    pub fn inputs<A: Abstraction<D>>(&self, abstraction: &A, first: [u32; D]) -> A::Inputs {
         let anchor = abstraction.anchor(first);
         if let Some(unchanged) = &self.dirty.unchanged {
             match abstraction.block_hull(&anchor, None) {
                 Some(hull) if !unchanged.of_block.includes(&hull) => {}
-                _ => return 0,
+                _ => return A::Inputs::default(),
             }
         }
-        let mut mask = 0;
+        let mut mask = A::Inputs::default();
         for input in 0..abstraction.inputs() {
             // The core first: it fails most often.
             match (&self.core, abstraction.block_core(&anchor, input)) {
@@ -263,7 +268,7 @@ impl<const D: usize> Filter<D> {
                     _ => continue,
                 }
             }
-            mask |= 1 << input;
+            mask = mask | A::Inputs::only(input);
         }
         mask
     }
@@ -303,7 +308,7 @@ mod tests {
             assert!(
                 seen.iter()
                     .zip(blocks.count_cells(|_| true))
-                    .all(|(a, b)| *a == b || *a == 0)
+                    .all(|(a, b)| *a == b.into_inner() || *a == 0)
             );
             visits
         };

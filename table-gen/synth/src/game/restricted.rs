@@ -1,9 +1,11 @@
-//! Reach again with a controller in hand: which cells does it win, in how many steps, and what else is then allowed?
+//! Reach again with a controller in hand: which cells does it win, in how many steps, and what else
+//! is then allowed?
 //!
-//! The least fixed point of a reach game in which a cell may be won only by the inputs that a controller *chose* for it.
-//! The ranks are the controller's own worst-case steps. The masks hold *every* input whose box lies in the cells won
-//! before, chosen or not: each of them lowers the rank too, so a controller that picks any of them cell by cell still
-//! wins. A slower controller leaves more such freedom, which compression lives on.
+//! The least fixed point of a reach game in which a cell may be won only by the inputs that a
+//! controller *chose* for it. The ranks are the controller's own worst-case steps. The masks hold
+//! *every* input whose box lies in the cells won before, chosen or not: each of them lowers the
+//! rank too, so a controller that picks any of them cell by cell still wins. A slower controller
+//! leaves more such freedom, which compression lives on.
 
 use rayon::prelude::*;
 
@@ -29,7 +31,8 @@ pub struct Restricted<'g, const D: usize, A, G> {
     pub target: &'g BitSet,
     /// Cells outside domain and target count as lost.
     pub domain: &'g BitSet,
-    /// Cells that another controller decides: they keep to what was chosen for them, even as a last resort.
+    /// Cells that another controller decides: they keep to what was chosen for them, even as a last
+    /// resort.
     pub settled: Option<&'g BitSet>,
     /// Forbids inputs.
     pub guard: &'g G,
@@ -37,9 +40,10 @@ pub struct Restricted<'g, const D: usize, A, G> {
     pub watch: &'g dyn Watch,
 }
 
-impl<const D: usize, A: Abstraction<D>, G: Guard<D>> Restricted<'_, D, A, G> {
-    /// Solves the game for the inputs that `chosen` gives in each cell. Where those win nothing more and `last_resort` is
-    /// set, a sweep with all inputs follows, and then the chosen ones again.
+impl<const D: usize, A: Abstraction<D, Inputs = u32>, G: Guard<D>> Restricted<'_, D, A, G> {
+    /// Solves the game for the inputs that `chosen` gives in each cell. Where those win nothing
+    /// more and `last_resort` is set, a sweep with all inputs follows, and then the chosen ones
+    /// again.
     ///
     /// # Errors
     /// An empty target, too many sweeps, or an interruption.

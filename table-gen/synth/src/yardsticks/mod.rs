@@ -1,0 +1,15 @@
+//! Plants by which tools of the field are compared, and one of our own field with more states; the
+//! engine knows none of them.
+//!
+//! | yardstick | states | dynamics | game |
+//! |---|---|---|---|
+//! | [`boost_converter`] | 2 | switched affine, two modes | safety |
+//! | [`unicycle`] | 3 | non-linear, growth bound | reach a place, around obstacles |
+//! | [`two_areas`] | 5 | linear, two inputs, two losses | reach and stay |
+//!
+//! The first two have SCOTS' parameters (version 0.2, `examples/dcdc` and `examples/vehicle`), so
+//! that counts can be compared.
+
+pub mod boost_converter;
+pub mod two_areas;
+pub mod unicycle;
