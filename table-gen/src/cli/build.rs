@@ -9,6 +9,7 @@ use firmware::table::{
 };
 use serde::Serialize;
 
+use super::checkpoint::CheckpointArgs;
 use super::files::write_all;
 use super::synth::SynthReport;
 use super::{Failure, OutputArgs, SpecArgs, output, progress, simulate, verify};
@@ -21,7 +22,6 @@ use model::verdict::ClaimName;
 use synth::budget;
 use synth::compress::{LawReport, Options, VISITS_GOAL};
 use synth::pipeline::{self, Emitted, Encoding};
-use synth::synthesis;
 
 /// Arguments of `build`.
 #[derive(Debug, clap::Args)]
@@ -42,6 +42,8 @@ pub(super) struct BuildArgs {
     /// Keep every winning cell, whatever the domain's bytes
     #[arg(long)]
     exact_domain: bool,
+    #[command(flatten)]
+    checkpoint: CheckpointArgs,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -109,7 +111,7 @@ pub(super) fn run(args: &BuildArgs) -> Result<(), Failure> {
         };
         (SynthReport::of_response(&spec), emitted)
     } else {
-        let synthesis = synthesis::synthesise(&spec, &progress::watch)?;
+        let synthesis = args.checkpoint.synthesise(&spec)?;
         let emitted = pipeline::emit(&spec, &synthesis, args.encoding(), &progress::watch)?;
         (SynthReport::new(&spec, &synthesis), emitted)
     };

@@ -1,10 +1,12 @@
 //! The commands of `table-gen`, one file each, and what they share.
 //!
-//! Exit codes: 0 done; 1 the answer is "no" (not verified, no controller exists, limit reached); 2 bad input.
+//! Exit codes: 0 done; 1 the answer is "no" (not verified, no controller exists, limit reached); 2
+//! bad input.
 
 mod band;
 mod budget;
 mod build;
+mod checkpoint;
 mod counterfactual;
 mod falsify;
 mod files;
@@ -18,6 +20,8 @@ mod ocpp;
 mod output;
 mod plot;
 mod progress;
+#[cfg(feature = "mpi")]
+mod ranks;
 mod record;
 mod replay;
 mod report;
@@ -87,7 +91,8 @@ pub(crate) struct SpecArgs {
 /// Options of every command that reads a spec.
 #[derive(Debug, Clone, Args)]
 pub(crate) struct Overrides {
-    /// Override a key of the spec, e.g. plant.inertia_gw_s_per_hz=3; KEY=none removes an optional one
+    /// Override a key of the spec, e.g. plant.inertia_gw_s_per_hz=3; KEY=none removes an optional
+    /// one
     #[arg(long = "set", value_name = "KEY=VALUE")]
     set: Vec<String>,
 }

@@ -1,7 +1,7 @@
 //! Progress of long work on stderr, and the way to interrupt it.
 //!
-//! On a terminal one line is drawn over and over; elsewhere (a log, a pipe) a plain line comes every half a minute. Work of less
-//! than a second shows nothing.
+//! On a terminal one line is drawn over and over; elsewhere (a log, a pipe) a plain line comes
+//! every half a minute. Work of less than a second shows nothing.
 
 use std::io::{IsTerminal, Write};
 use std::sync::Mutex;
@@ -21,7 +21,8 @@ const SPARSE: Duration = Duration::from_secs(30);
 
 static INTERRUPTED: AtomicBool = AtomicBool::new(false);
 
-/// From now on Ctrl-C interrupts work at its next checkpoint instead of killing the process: nothing half-written stays.
+/// From now on Ctrl-C interrupts work at its next checkpoint instead of killing the process:
+/// nothing half-written stays.
 pub(super) fn catch_interrupts() {
     // A second call, or a system without signals, leaves the default behaviour.
     let _ = ctrlc::set_handler(|| {
@@ -115,6 +116,21 @@ impl Watch for GameProgress {
         });
         !interrupted()
     }
+
+    fn guarded(&self, share: f64) {
+        self.line.show(|elapsed| {
+            let s = elapsed.as_secs_f64();
+            let left = match share {
+                0.0 => String::new(),
+                share => format!(", {:.0} s left", s * (1.0 - share) / share),
+            };
+            format!(
+                "{} guard: {:.0} %, {s:.0} s{left}",
+                self.name,
+                100.0 * share
+            )
+        });
+    }
 }
 
 /// An observer for a game, as synthesis asks for.
@@ -126,7 +142,8 @@ pub(super) fn watch(name: &'static str) -> Box<dyn Watch> {
     })
 }
 
-/// Shows the share of a piece of work that is done; the function it returns answers whether to go on.
+/// Shows the share of a piece of work that is done; the function it returns answers whether to go
+/// on.
 pub(super) fn share(name: &'static str) -> impl Fn(f64) -> bool {
     let line = Line::new();
     move |done| {

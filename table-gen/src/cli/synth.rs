@@ -2,6 +2,7 @@
 
 use serde::Serialize;
 
+use super::checkpoint::CheckpointArgs;
 use super::{Failure, OutputArgs, SpecArgs, output, progress};
 use model::spec::Spec;
 use synth::synthesis::{self, SolvedLaw, Synthesis};
@@ -14,9 +15,16 @@ pub(super) struct SynthArgs {
     spec: SpecArgs,
     #[command(flatten)]
     output: OutputArgs,
-    /// Also count the transitions of the abstraction (slow; for comparison with tools that store them)
+    /// Also count the transitions of the abstraction (slow; for comparison with tools that store
+    /// them)
     #[arg(long)]
     count_transitions: bool,
+    /// Also print a checksum of each law's inputs and ranks, to compare runs on other numbers of
+    /// threads and ranks
+    #[arg(long)]
+    digest: bool,
+    #[command(flatten)]
+    checkpoint: CheckpointArgs,
 }
 
 /// One game, as JSON and the table show it.
@@ -29,6 +37,8 @@ pub(super) struct ProblemReport {
     worst_steps: u16,
     cpu_s: f64,
     wall_s: f64,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    digest: Option<String>,
 }
 
 /// The answer of `synth`; `build` repeats it.
@@ -44,6 +54,9 @@ pub(super) struct SynthReport {
     abstraction_cpu_s: f64,
     problems: Vec<ProblemReport>,
     peak_rss_mb: Option<f64>,
+    #[cfg(feature = "mpi")]
+    #[serde(skip_serializing_if = "Option::is_none")]
+    ranks: Option<super::ranks::RanksReport>,
 }
 
 impl SynthReport {
@@ -58,16 +71,13 @@ impl SynthReport {
             abstraction_cpu_s: 0.0,
             problems: Vec::new(),
             peak_rss_mb: usage::peak_rss_mb(),
+            #[cfg(feature = "mpi")]
+            ranks: None,
         }
     }
 
     /// The report of a synthesis.
     pub(super) fn new(spec: &Spec, synthesis: &Synthesis) -> Self {
-        let laws = [
-            ("C1", Some(&synthesis.c1)),
-            ("C2", synthesis.c2.as_ref()),
-            ("Hold", synthesis.hold.as_ref()),
-        ];
         Self {
             spec: spec.name.clone(),
             response: false,
@@ -75,12 +85,28 @@ impl SynthReport {
             inputs: spec.input.levels(),
             transitions: None,
             abstraction_cpu_s: synthesis.abstraction_cpu_s,
-            problems: laws
+            problems: synthesis
+                .all()
                 .into_iter()
-                .filter_map(|(name, law)| Some(problem(name, law?)))
+                .map(|(name, law)| problem(name, law))
                 .collect(),
             peak_rss_mb: usage::peak_rss_mb(),
+            #[cfg(feature = "mpi")]
+            ranks: None,
         }
+    }
+
+    /// Adds a checksum to each game, in their order.
+    pub(super) fn set_digest(&mut self, digests: Vec<String>) {
+        for (problem, digest) in self.problems.iter_mut().zip(digests) {
+            problem.digest = Some(digest);
+        }
+    }
+
+    /// Adds what the ranks needed.
+    #[cfg(feature = "mpi")]
+    pub(super) fn set_ranks(&mut self, ranks: super::ranks::RanksReport) {
+        self.ranks = Some(ranks);
     }
 
     /// The same as a table on stdout.
@@ -119,6 +145,11 @@ impl SynthReport {
             ]);
         }
         output::line(table);
+        for problem in &self.problems {
+            if let Some(digest) = &problem.digest {
+                output::line(format_args!("{}: {digest}", problem.name));
+            }
+        }
         if let Some(transitions) = self.transitions {
             output::line(format_args!("transitions: {transitions}"));
         }
@@ -129,42 +160,75 @@ impl SynthReport {
 }
 
 fn problem(name: &'static str, law: &SolvedLaw) -> ProblemReport {
-    let ranks = &law.solution.ranks;
-    let worst = ranks
-        .iter()
-        .filter(|rank| **rank != synth::game::NOT_WON)
-        .max();
+    // The last sweep of a reach game wins nothing; safety has no steps.
+    let worst_steps = match name {
+        "Hold" => 0,
+        _ => law.solution.sweeps.saturating_sub(1),
+    };
     ProblemReport {
         name,
         target_cells: law.target_cells,
         winning_cells: law.solution.winning,
         iterations: law.solution.sweeps,
-        worst_steps: worst.copied().unwrap_or(0),
+        worst_steps,
         cpu_s: law.cpu_s,
         wall_s: law.wall_s,
+        digest: None,
     }
+}
+
+/// One checksum of those of all layers.
+pub(super) fn digest_of(layers: &[u64]) -> String {
+    let sum = layers.iter().fold(0u64, |sum, layer| {
+        (sum.rotate_left(5) ^ layer).wrapping_mul(0x9E37_79B9_7F4A_7C15)
+    });
+    format!("{sum:016x}")
 }
 
 /// Runs the command.
 pub(super) fn run(args: &SynthArgs) -> Result<(), Failure> {
     let spec = args.spec.load()?;
     progress::catch_interrupts();
-    if spec.preference.always_on {
-        let report = SynthReport::of_response(&spec);
-        if args.output.json {
-            return output::json(&report);
-        }
-        report.print();
-        return Ok(());
+    #[cfg(feature = "mpi")]
+    if let Some(world) = mpi_ranks::World::join() {
+        return match super::ranks::run(&spec, &world, args.digest)? {
+            Some(report) => show(args, &report),
+            None => Ok(()),
+        };
     }
-    let synthesis = synthesis::synthesise(&spec, &progress::watch)?;
+    if spec.preference.always_on {
+        return show(args, &SynthReport::of_response(&spec));
+    }
+    let synthesis = args.checkpoint.synthesise(&spec)?;
     let mut report = SynthReport::new(&spec, &synthesis);
+    if args.digest {
+        let counts = synthesis.grid.count();
+        let layer = counts[..counts.len() - 1]
+            .iter()
+            .map(|n| usize::from(*n))
+            .product();
+        let digest = |law: &SolvedLaw| {
+            let own = 0..law.solution.ranks.len();
+            digest_of(&synthesis::layer_sums(&law.solution, own, layer))
+        };
+        report.set_digest(
+            synthesis
+                .all()
+                .into_iter()
+                .map(|(_, law)| digest(law))
+                .collect(),
+        );
+    }
     if args.count_transitions {
         let abstraction = synthesis::abstraction(&spec, &synthesis.grid).map_err(Failure::bad)?;
         report.transitions = Some(synthesis::count_transitions(&abstraction));
     }
+    show(args, &report)
+}
+
+fn show(args: &SynthArgs, report: &SynthReport) -> Result<(), Failure> {
     if args.output.json {
-        output::json(&report)
+        output::json(report)
     } else {
         report.print();
         Ok(())

@@ -44,6 +44,11 @@ const TOOLS: &[Tool] = &[
         packages: &["chromium", "fonts-liberation"],
         why: "opens the HTML report and checks what a reader sees",
     },
+    Tool {
+        programs: &["mpicc"],
+        packages: &["libopenmpi-dev", "openmpi-bin", "libclang-dev"],
+        why: "builds table-gen with the feature mpi; mpirun runs its ranks",
+    },
 ];
 
 /// The step `prerequisites`: installs what is missing where that is allowed, and otherwise says how
