@@ -27,6 +27,12 @@ pub(super) struct CheckpointArgs {
 }
 
 impl CheckpointArgs {
+    /// Whether a folder was given.
+    #[cfg(feature = "mpi")]
+    pub(super) fn is_asked(&self) -> bool {
+        self.checkpoint.is_some()
+    }
+
     /// Plays the games of a spec.
     pub(super) fn synthesise(&self, spec: &Spec) -> Result<Synthesis, Failure> {
         let Some(folder) = &self.checkpoint else {

@@ -191,6 +191,11 @@ pub(super) fn run(args: &SynthArgs) -> Result<(), Failure> {
     progress::catch_interrupts();
     #[cfg(feature = "mpi")]
     if let Some(world) = mpi_ranks::World::join() {
+        if args.count_transitions || args.checkpoint.is_asked() {
+            return Err(Failure::BadInput(
+                "--checkpoint and --count-transitions are for a single process".to_owned(),
+            ));
+        }
         return match super::ranks::run(&spec, &world, args.digest)? {
             Some(report) => show(args, &report),
             None => Ok(()),
