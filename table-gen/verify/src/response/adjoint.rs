@@ -39,6 +39,8 @@ pub struct Step {
     pub net_most: f64,
     /// How far f may leave the chord between the step's samples \[Hz\].
     pub slack: f64,
+    /// Bound of |f'| in the step \[Hz/s\].
+    pub rate: f64,
 }
 
 /// The steps so far, and what bounds the state where a sweep ends early.

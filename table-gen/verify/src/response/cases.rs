@@ -55,8 +55,8 @@ impl Found {
 }
 
 /// Bounds for one case; nothing if the resolution does not fit the assumptions (readings that act within their own step, a slope window that is
-/// not whole steps), if f may leave ±1 Hz, or if `go_on` ends it.
-pub fn examine(case: &Case, resolution: Resolution, go_on: &dyn Fn() -> bool) -> Option<Found> {
+/// not whole steps), or if f may leave ±1 Hz.
+pub fn examine(case: &Case, resolution: Resolution) -> Option<Found> {
     let number = FleetLoop::new(&case.plant, case.law, case.assumed, resolution.step_s);
     let window = Window::new(&number)?;
     let memory = number.steps_up(resolution.memory_s);
@@ -86,7 +86,7 @@ pub fn examine(case: &Case, resolution: Resolution, go_on: &dyn Fn() -> bool) ->
         },
         resolution.step_s,
     );
-    let event = Event::follow(&settled, window, before, resolution.follow_s, memory, go_on);
+    let event = Event::follow(&settled, window, before, resolution.follow_s, memory);
     let count = event.samples.samples.len();
     let tube: Vec<Interval> = (0..count.saturating_sub(1)).map(|k| event.tube(k)).collect();
     let followed = tube.iter().copied().reduce(Interval::join)?;
@@ -104,48 +104,4 @@ pub fn examine(case: &Case, resolution: Resolution, go_on: &dyn Fn() -> bool) ->
         tube,
         step_s: resolution.step_s,
     })
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::response::testing::{assumed, law, plant};
-
-    #[test]
-    #[ignore]
-    fn shown() {
-        let bands: Vec<f64> = std::env::var("W")
-            .unwrap_or("0.3,1.2,2.0,2.18".into())
-            .split(',')
-            .map(|s| s.parse().unwrap())
-            .collect();
-        for low in bands {
-            let start = std::time::Instant::now();
-            let mut assumed = assumed();
-            assumed.loss = Interval::hull(low, low + 0.02);
-            let case = Case {
-                plant: plant(),
-                law: law(),
-                last: assumed.loss,
-                assumed,
-            };
-            let resolution = Resolution {
-                step_s: 0.05,
-                follow_s: 45.0,
-                memory_s: 25.0,
-            };
-            let found = examine(&case, resolution, &|| true);
-            match found {
-                Some(found) => println!(
-                    "{low} f [{:.3}, {:.3}] ever {:?} inside {:?} {:.2}s",
-                    found.f.low,
-                    found.f.high,
-                    found.for_ever,
-                    found.inside_from_s(Interval::hull(-0.3, 0.1)),
-                    start.elapsed().as_secs_f64()
-                ),
-                None => println!("{low} nothing {:.2}s", start.elapsed().as_secs_f64()),
-            }
-        }
-    }
 }

@@ -81,6 +81,7 @@ impl Watched {
             turbine: ranges[TURBINE],
             slope_response: Interval::ZERO,
             slack: 0.0,
+            rate: 0.0,
         };
         let [g, l, p] = [0, 1, 2].map(|axis| ranges[FIRST_STATE + axis]);
         (sample, [f, g, l, p])
@@ -98,14 +99,13 @@ pub struct Event<'a> {
 
 impl<'a> Event<'a> {
     /// Bounds of every sample up to a time, from rest, or from a state in which the bounds `before` hold and go on to
-    /// hold. Ends early where f may leave ±[`F_MOST_HZ`], or where `go_on` says so.
+    /// hold. Ends early where f may leave ±[`F_MOST_HZ`].
     pub fn follow(
         number: &'a FleetLoop,
         window: Window,
         before: Option<Reproduced>,
         duration_s: f64,
         memory: usize,
-        go_on: &dyn Fn() -> bool,
     ) -> Self {
         let mut watched = Watched::new(number, &window);
         let mut samples = Samples {
@@ -130,12 +130,16 @@ impl<'a> Event<'a> {
             let first = (k * TRIED) % all.len();
             let tried: Vec<Choice> = (0..TRIED).map(|n| all[(first + n) % all.len()]).collect();
             let (mut sample, mut state) = watched.bounds(&past, k, &tried);
-            sample.slack = past.steps.last().map_or(0.0, |step: &Step| step.slack);
+            // Until its own step is known, that of the step before.
+            let last: Option<&Step> = past.steps.last();
+            sample.slack = last.map_or(0.0, |step| step.slack);
+            sample.rate = last.map_or(0.0, |step| step.rate);
             samples.samples.push(sample);
             sample.slope_response = samples.slope_response(k, sample.change_slope);
             if let Some(before) = &before {
                 sample = Sample {
                     slack: before.sample.slack,
+                    rate: before.sample.rate,
                     ..sample.meet(&before.sample)
                 };
                 state = std::array::from_fn(|axis| meet(state[axis], before.state[axis]));
@@ -146,10 +150,11 @@ impl<'a> Event<'a> {
             let step = samples.step(k);
             if let Some(sample) = samples.samples.last_mut() {
                 sample.slack = step.slack;
+                sample.rate = step.rate;
             }
             past.steps.push(step);
             past.states.push(state);
-            if sample.f.magnitude() >= F_MOST_HZ || !go_on() {
+            if sample.f.magnitude() >= F_MOST_HZ {
                 break;
             }
         }

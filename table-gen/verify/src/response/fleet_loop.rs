@@ -65,6 +65,8 @@ pub struct Assumed {
     pub tick_s: f64,
     /// Error of a reading \[Hz\].
     pub reading_hz: f64,
+    /// By how much the time between the two readings of a slope may differ from the law's window \[s\].
+    pub slope_jitter_s: f64,
     /// Relative error of the delivered participation.
     pub participation: f64,
     /// Absolute error of the delivered participation.

@@ -68,6 +68,7 @@ pub fn from_rest(number: &FleetLoop, window: Window, memory: usize) -> Option<Re
         },
         slope_response: Interval::ZERO,
         slack: 0.0,
+        rate: number.rate_before,
     };
     let mut bounds = reproduced(number, window, memory, sample, state)?;
     for _ in 0..ROUNDS {
@@ -129,7 +130,7 @@ impl Reproduced {
         memory: usize,
     ) -> (Sample, [Interval; 4]) {
         let step = self.step(number, window);
-        let slack = step.slack;
+        let (slack, rate) = (step.slack, step.rate);
         let past = Past {
             loop_: number,
             steps: vec![step],
@@ -143,13 +144,15 @@ impl Reproduced {
         let at = memory + look_back(&window);
         let (mut sample, state) = Watched::new(number, &window).bounds(&past, at, &all);
         sample.slack = slack;
+        sample.rate = rate;
         (sample, state)
     }
 
     /// Whether the next sample's bounds lie inside these.
     fn holds(&self, sample: &Sample, state: &[Interval; 4]) -> bool {
-        // The slack enters the lines by way of the readings: it must not be larger than what was assumed.
+        // Slack and rate enter the lines by way of the readings: they must not be larger than what was assumed.
         sample.slack <= self.sample.slack
+            && sample.rate <= self.sample.rate
             && pairs(&self.sample, sample)
                 .into_iter()
                 .chain(self.state.into_iter().zip(*state))
@@ -219,6 +222,16 @@ fn join(a: Sample, b: Sample) -> Sample {
         turbine: a.turbine.join(b.turbine),
         slope_response: a.slope_response.join(b.slope_response),
         slack: a.slack.max(b.slack),
+        rate: a.rate.max(b.rate),
+    }
+}
+
+/// The same for a bound of a magnitude.
+fn grow_most(outer: f64, found: f64) -> f64 {
+    if found > outer {
+        found * (1.0 + WIDEN)
+    } else {
+        outer
     }
 }
 
@@ -232,11 +245,8 @@ fn grown(outer: Sample, found: Sample) -> Sample {
         change_slope: grow(outer.change_slope, found.change_slope),
         net: grow(outer.net, found.net),
         turbine: grow(outer.turbine, found.turbine),
-        slack: if found.slack > outer.slack {
-            found.slack * (1.0 + WIDEN)
-        } else {
-            outer.slack
-        },
+        slack: grow_most(outer.slack, found.slack),
+        rate: grow_most(outer.rate, found.rate),
         ..outer
     }
 }

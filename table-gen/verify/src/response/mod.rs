@@ -14,7 +14,9 @@
 //! | the window of readings that act in a step | `window` |
 //! | from the event on | `event` |
 //! | for ever | `for_ever` |
-//! | bands of the loss and of the plant's parameters, in parallel | `cases` |
+//! | what the spec's meter makes of f | `meter` |
+//! | one case; all cases of a proof, in parallel | `cases`, `plan` |
+//! | from the bytes to the claims | `proof` |
 
 mod adjoint;
 mod cases;
@@ -22,9 +24,15 @@ mod event;
 mod fleet_loop;
 mod for_ever;
 mod lines;
+mod meter;
+mod plan;
+mod proof;
 #[cfg(test)]
 mod testing;
 mod window;
 
 pub use cases::{Case, Found, Resolution, examine};
+pub use meter::error_hz;
+pub use plan::{Summary, cases, examine_all};
+pub use proof::{Proof, verify};
 pub use fleet_loop::{Assumed, FleetLoop, Law, LossProfile, PlantBand};

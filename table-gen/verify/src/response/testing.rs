@@ -27,6 +27,7 @@ pub(super) fn assumed() -> Assumed {
         late_most_s: 0.7,
         tick_s: 0.1,
         reading_hz: 0.002,
+        slope_jitter_s: 0.02,
         participation: 0.1,
         participation_absolute: 0.0,
         hostile_share: 0.0,

@@ -67,6 +67,8 @@ pub struct Sample {
     pub slope_response: Interval,
     /// How far f may leave the chord in the step that begins at this sample.
     pub slack: f64,
+    /// Bound of |f'| in that step.
+    pub rate: f64,
 }
 
 impl Sample {
@@ -82,6 +84,7 @@ impl Sample {
             turbine: meet(self.turbine, other.turbine),
             slope_response: meet(self.slope_response, other.slope_response),
             slack: self.slack.min(other.slack),
+            rate: self.rate.min(other.rate),
         }
     }
 }
@@ -173,21 +176,28 @@ impl Samples<'_> {
         best
     }
 
-    /// Largest slack of the steps whose samples readings of step k may lie between.
-    pub fn slack(&self, k: usize) -> f64 {
+    /// The largest of something over the steps that readings before sample k may lie in.
+    fn largest(&self, k: usize, of: impl Fn(&Sample) -> f64) -> f64 {
         if self.repeats {
-            return self.samples.first().map_or(0.0, |s| s.slack);
+            return self.samples.first().map_or(0.0, of);
         }
         let oldest = k.saturating_sub(self.window.oldest + self.window.slope + 1);
         let within = self.samples.get(oldest..=k).unwrap_or_default();
-        let before = self.before.map_or(0.0, |s| s.slack);
-        within.iter().map(|s| s.slack).fold(before, f64::max)
+        let before = self.before.as_ref().map_or(0.0, &of);
+        within.iter().map(of).fold(before, f64::max)
     }
 
-    /// Error of a measured slope \[Hz/s\].
+    /// Largest slack of the steps whose samples readings of step k may lie between.
+    pub fn slack(&self, k: usize) -> f64 {
+        self.largest(k, |sample| sample.slack)
+    }
+
+    /// Error of a measured slope \[Hz/s\]: of its two readings, and of the time between them.
     fn slope_error(&self, k: usize) -> f64 {
-        let both = 2.0 * (self.number.assumed.reading_hz + self.slack(k));
-        both / self.number.law.slope_window_s * (1.0 + 1e-12)
+        let assumed = &self.number.assumed;
+        let both = 2.0 * (assumed.reading_hz + self.slack(k));
+        let rate = self.largest(k, |sample| sample.rate).max(self.number.rate_before);
+        (both + assumed.slope_jitter_s * rate) / self.number.law.slope_window_s * (1.0 + 1e-12)
     }
 
     /// Slope response, before the release, of a slope: a participation.
@@ -304,6 +314,7 @@ impl Samples<'_> {
             f_most: (f.magnitude() + f_move) * (1.0 + 1e-9),
             net_most: net_most * (1.0 + 1e-9),
             slack: self.slack_of(sample, spread, net_most),
+            rate: self.number.inverse_inertia_most * net_most * (1.0 + 1e-9),
         }
     }
 
