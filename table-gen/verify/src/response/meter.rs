@@ -8,17 +8,16 @@
 //! | clock, temperature and ageing included | `ppm f` |
 //! | resolution of the timer or the chip | itself |
 //! | constant bias | itself |
-//! | mean over the window against its middle, for |f''| within [`CURVATURE_HZ_PER_S2`] | `T² f'' / 24` |
 //!
-//! f is at most 55 Hz here. Its lag is half the window and its age, which count as delay.
+//! f is at most 55 Hz here. Cycles over time is the mean of f over the window, and a mean of a continuous function is its value at some
+//! moment of the window: so a reading speaks exactly of a moment between its age and its age plus T ago, which counts as delay. The difference
+//! of two readings is, in the same way, the exact difference of f at two moments that lie a slope window apart, but for their ages.
 
 use model::spec::{MeterKind, Spec};
 use model::verdict::{Claim, ClaimName};
 
 /// Largest frequency \[Hz\] for which the errors hold.
 const FREQUENCY_MOST_HZ: f64 = 55.0;
-/// Largest |f''| \[Hz/s²\] that is counted: 2.2 GW that begin to be answered by the whole fleet within half a second, at 102 GVA s.
-const CURVATURE_HZ_PER_S2: f64 = 2.0;
 /// Cycles a second.
 const CYCLES_PER_S: f64 = 50.0;
 
@@ -31,8 +30,7 @@ pub fn error_hz(spec: &Spec) -> f64 {
     let window_s = f64::from(meter.window_cycles) / CYCLES_PER_S;
     let jitter = 2.0 * meter.jitter_us * 1e-6 * FREQUENCY_MOST_HZ / window_s;
     let clock = meter.clock_ppm * 1e-6 * FREQUENCY_MOST_HZ;
-    let mean = window_s * window_s * CURVATURE_HZ_PER_S2 / 24.0;
-    (jitter + clock + meter.resolution_hz + meter.bias_hz + mean) * (1.0 + 1e-12)
+    (jitter + clock + meter.resolution_hz + meter.bias_hz) * (1.0 + 1e-12)
 }
 
 /// The claim.

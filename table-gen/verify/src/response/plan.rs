@@ -13,18 +13,21 @@ const INERTIA_CELL: f64 = 0.06;
 const GAIN_CELL: f64 = 0.06;
 const DAMPING_CELL_GW_PER_HZ: f64 = 0.2;
 
-/// How finely a constant loss is followed.
-const CONSTANT: Resolution = Resolution {
-    step_s: 0.05,
-    follow_s: 60.0,
-    memory_s: 25.0,
-};
-/// How finely a loss that moves is followed: shorter steps, because it may jump within one.
-const MOVING: Resolution = Resolution {
-    step_s: 0.025,
-    follow_s: 60.0,
-    memory_s: 25.0,
-};
+/// How finely cases are followed, in turn until one is good enough. A loss that moves may jump within a step, so its
+/// steps are short from the first.
+const CONSTANT: [Resolution; 2] = [
+    Resolution {
+        step_s: 0.05,
+        follow_s: 50.0,
+        memory_s: 25.0,
+    },
+    Resolution {
+        step_s: 0.025,
+        follow_s: 50.0,
+        memory_s: 25.0,
+    },
+];
+const MOVING: [Resolution; 1] = [CONSTANT[1]];
 
 /// What was found for all cases.
 #[derive(Debug, Clone)]
@@ -108,18 +111,33 @@ fn split(range: Interval, width: f64) -> Vec<Interval> {
 /// Cases that are examined between two reports of progress.
 const TOGETHER: usize = 8;
 
-/// Examines all cases, on all threads. `go_on` is told the share that is done and may end it: then nothing comes back.
-pub fn examine_all(all: &Case, go_on: &dyn Fn(f64) -> bool) -> Option<Summary> {
+/// Examines all cases, on all threads, more finely where what was found is not `enough`. `go_on` is told the share that is
+/// done and may end it: then nothing comes back.
+pub fn examine_all(
+    all: &Case,
+    enough: &(dyn Fn(&Found) -> bool + Sync),
+    go_on: &dyn Fn(f64) -> bool,
+) -> Option<Summary> {
     let cases = cases(all);
-    let resolution = match all.assumed.profile {
-        LossProfile::Constant => CONSTANT,
-        LossProfile::NonDecreasing | LossProfile::Band => MOVING,
+    let resolutions: &[Resolution] = match all.assumed.profile {
+        LossProfile::Constant => &CONSTANT,
+        LossProfile::NonDecreasing | LossProfile::Band => &MOVING,
+    };
+    let best = |case: &Case| {
+        let mut found = None;
+        for resolution in resolutions {
+            found = examine(case, *resolution).or(found);
+            if found.as_ref().is_some_and(enough) {
+                break;
+            }
+        }
+        found
     };
     let mut found = Vec::with_capacity(cases.len());
     for together in cases.chunks(TOGETHER) {
         let part: Vec<(Case, Option<Found>)> = together
             .par_iter()
-            .map(|case| (*case, examine(case, resolution)))
+            .map(|case| (*case, best(case)))
             .collect();
         found.extend(part);
         if !go_on(found.len() as f64 / cases.len() as f64) {

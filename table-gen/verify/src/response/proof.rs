@@ -55,7 +55,13 @@ pub fn verify(
         claims.extend(not_examined(spec, "the law has no droop"));
         return Ok(unexamined(claims));
     }
-    let summary = examine_all(&all, go_on).ok_or(VerifyError::Interrupted)?;
+    let requirements = &spec.requirements;
+    let inner = Interval::hull(requirements.inner_hz[0], requirements.inner_hz[1]);
+    let enough = |found: &Found| {
+        requirements.containment_hz.is_none_or(|limit| found.f.low >= limit)
+            && found.inside_from_s(inner).is_some()
+    };
+    let summary = examine_all(&all, &enough, go_on).ok_or(VerifyError::Interrupted)?;
     let (found, counts) = judged(&summary, spec);
     claims.extend(found);
     Ok(Proof {
@@ -128,8 +134,9 @@ fn case(law: &ResponseLaw, table: &TableView<'_>, spec: &Spec) -> Case {
         },
         law: real_law(law, header.tick_ms),
         assumed: Assumed {
-            late_least_s: lag_least + delay_least,
-            late_most_s: lag_most + delay_most + tick_most_s,
+            // The lag is half the meter's window and the age: a reading is f at some moment of its window.
+            late_least_s: delay_least,
+            late_most_s: lag_least + lag_most + delay_most + tick_most_s,
             tick_s: tick_most_s,
             // A micro-hertz for the floor to micro-units, and what the steps' edges are rounded by.
             reading_hz: micro(assumed.estimate_error[0]) + 1.001e-6,
