@@ -22,8 +22,10 @@ pub struct Law {
     pub slope_window_s: f64,
     /// Largest slope response, a participation.
     pub slope_most: f64,
-    /// Release of the slope response \[1/s\].
+    /// Release of the slope response \[1/s\], at most: with ticks as the law counts them.
     pub release_per_s: f64,
+    /// Release of the slope response \[1/s\], at least: with the longest ticks.
+    pub release_least_per_s: f64,
     /// A command that differs from the target by less is kept.
     pub smallest_change: f64,
     /// What the device's integers may round the target by, a participation.
@@ -65,6 +67,8 @@ pub struct Assumed {
     pub tick_s: f64,
     /// Error of a reading \[Hz\].
     pub reading_hz: f64,
+    /// By how much the age of what readings speak of may differ \[s\].
+    pub age_spread_s: f64,
     /// By how much the time between the two readings of a slope may differ from the law's window \[s\].
     pub slope_jitter_s: f64,
     /// Relative error of the delivered participation.

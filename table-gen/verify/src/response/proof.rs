@@ -93,8 +93,7 @@ fn band<T: Into<f64> + Copy>(ends: [T; 2]) -> Interval {
 }
 
 /// The law in real numbers.
-fn real_law(law: &ResponseLaw, tick_ms: u16) -> Law {
-    let tick_s = f64::from(tick_ms) / 1000.0;
+fn real_law(law: &ResponseLaw, tick_s: f64, tick_most_s: f64) -> Law {
     Law {
         droop: share(law.droop_gain_ppm_per_hz),
         setpoint_hz: micro(law.setpoint_uhz),
@@ -103,6 +102,7 @@ fn real_law(law: &ResponseLaw, tick_ms: u16) -> Law {
         slope_window_s: f64::from(law.window_ticks) * tick_s,
         slope_most: share(law.slope_most_ppm),
         release_per_s: share(law.release_ppm) / tick_s,
+        release_least_per_s: share(law.release_ppm) / tick_most_s.max(tick_s),
         smallest_change: share(law.smallest_change_ppm),
         // A slope below 1 µHz/s, a slope response below 1 ppm, a target below 1 ppm.
         rounding: share(law.slope_gain_ppm_s_per_hz) * 1e-6 + 3e-6,
@@ -132,7 +132,7 @@ fn case(law: &ResponseLaw, table: &TableView<'_>, spec: &Spec) -> Case {
             governor_gain: band(assumed.governor_gain_kw_per_hz),
             damping: band(assumed.damping_kw_per_hz),
         },
-        law: real_law(law, header.tick_ms),
+        law: real_law(law, tick_s, tick_most_s),
         assumed: Assumed {
             // The lag is half the meter's window and the age: a reading is f at some moment of its window.
             late_least_s: delay_least,
@@ -140,6 +140,7 @@ fn case(law: &ResponseLaw, table: &TableView<'_>, spec: &Spec) -> Case {
             tick_s: tick_most_s,
             // A micro-hertz for the floor to micro-units, and what the steps' edges are rounded by.
             reading_hz: micro(assumed.estimate_error[0]) + 1.001e-6,
+            age_spread_s: lag_least + lag_most,
             slope_jitter_s: lag_most - lag_least + longer,
             participation: share(assumed.participation_relative_ppm),
             participation_absolute: share(assumed.participation_absolute_ppm),

@@ -16,6 +16,7 @@ pub(super) fn law() -> Law {
         slope_window_s: 0.5,
         slope_most: 0.9 / FLEET_GW,
         release_per_s: 0.05 / FLEET_GW,
+        release_least_per_s: 0.05 / FLEET_GW,
         smallest_change: 0.05,
         rounding: 4e-6,
     }
@@ -27,6 +28,7 @@ pub(super) fn assumed() -> Assumed {
         late_most_s: 0.7,
         tick_s: 0.1,
         reading_hz: 0.002,
+        age_spread_s: 0.12,
         slope_jitter_s: 0.02,
         participation: 0.1,
         participation_absolute: 0.0,

@@ -217,6 +217,7 @@ impl Samples<'_> {
         // A reading between the two samples: the slope lies between theirs.
         let steepest = change_slope.low.min(slope_before.low);
         let release = law.release_per_s * self.number.step_s;
+        let release_least = law.release_least_per_s * self.number.step_s;
         let high = self.answer(of(steepest) - error) + pad;
         // Every charger takes a reading within a tick of any moment, and remembers it.
         let mut flattest = change_slope.high;
@@ -242,7 +243,7 @@ impl Samples<'_> {
         }
         Interval {
             low: low.max(held.low - release - pad).max(0.0),
-            high: high.max(held.high - release + pad).max(0.0),
+            high: high.max(held.high - release_least + pad).max(0.0),
         }
     }
 
@@ -255,6 +256,8 @@ impl Samples<'_> {
             .map(|back| self.get(k, back).map_or(Interval::ZERO, |s| s.slope_response))
             .reduce(Interval::join)
             .unwrap_or(Interval::ZERO);
+        // The release counts from reading to reading, the bounds from what they speak of to what they speak of.
+        let aged = self.number.law.release_per_s * assumed.age_spread_s;
         let middle = window.newest.midpoint(window.oldest);
         // How far the highest (lowest) f of the window may lie above (below) a sample of it.
         let reach = |at: usize, side: Side| {
@@ -282,8 +285,9 @@ impl Samples<'_> {
                 side,
                 reach_hz: reach_hz + reading,
                 slope_response: match side {
-                    Side::Below => held.low,
-                    Side::Above => held.high,
+                    Side::Below => (held.low - aged).max(0.0),
+                    Side::Above if held.high > 0.0 => held.high + aged,
+                    Side::Above => 0.0,
                 },
             };
             let range = self.f(k, at);

@@ -1,0 +1,288 @@
+//! The bounds of a fleet under a response, attacked: fleets of single chargers with the firmware's own law, drawn at random and chosen with
+//! malice, never leave them.
+//!
+//! The plant is integrated here by itself (classic Runge-Kutta, 5 ms), the chargers run `firmware::response`; nothing of the verifier is used but
+//! the bounds that it gives. Within the hypotheses everything is drawn anew: clocks, delays that change at every tick, ages and errors of readings,
+//! delivery, the loss, and the state that the event finds.
+
+use firmware::response::{LevelOffset, Response, ResponseLaw};
+use model::interval::Interval;
+use model::plant::GridPlant;
+use rand::RngExt;
+use rand_pcg::Pcg64;
+use rand_pcg::rand_core::SeedableRng;
+use verify::response::{Assumed, Case, Found, Law, LossProfile, PlantBand, Resolution, examine};
+
+const FLEET_GW: f64 = 1.4;
+const TICK_S: f64 = 0.1;
+/// Integration step \[s\].
+const H: f64 = 0.005;
+/// Window of the meter \[s\].
+const METER_S: f64 = 0.1;
+/// Largest age of a reading \[s\].
+const AGE_S: f64 = 0.02;
+const DELAY_S: [f64; 2] = [0.1, 0.5];
+const READING_HZ: f64 = 0.003;
+const DELIVERY: f64 = 0.1;
+
+/// The law of gb-bi, as integers.
+const LAW: ResponseLaw = ResponseLaw {
+    droop_gain_ppm_per_hz: 4_071_429,
+    setpoint_uhz: -42_000,
+    slope_gain_ppm_s_per_hz: 1_785_714,
+    slope_threshold_uhz_per_s: 80_000,
+    window_ticks: 5,
+    slope_most_ppm: 285_714,
+    release_ppm: 3_571,
+    smallest_change_ppm: 50_000,
+};
+
+fn plant() -> GridPlant {
+    GridPlant {
+        governor_gain: -5.0,
+        governor_time: 2.5,
+        turbine_time: 0.5,
+        lead_time: 2.0,
+        lag_time: 12.0,
+        damping: 1.0,
+        inertia: 4.0,
+        fleet: FLEET_GW,
+    }
+}
+
+fn case(loss: Interval) -> Case {
+    let known = plant();
+    let share = |ppm: u32| f64::from(ppm) / 1e6;
+    Case {
+        plant: PlantBand {
+            known,
+            inertia: Interval::point(known.inertia),
+            governor_gain: Interval::point(known.governor_gain),
+            damping: Interval::point(known.damping),
+        },
+        law: Law {
+            droop: share(LAW.droop_gain_ppm_per_hz),
+            setpoint_hz: -0.042,
+            slope: share(LAW.slope_gain_ppm_s_per_hz),
+            slope_threshold_hz_per_s: 0.08,
+            slope_window_s: 0.5,
+            slope_most: share(LAW.slope_most_ppm),
+            release_per_s: share(LAW.release_ppm) / TICK_S,
+            release_least_per_s: share(LAW.release_ppm) / TICK_S,
+            smallest_change: share(LAW.smallest_change_ppm),
+            rounding: 6e-6,
+        },
+        assumed: Assumed {
+            late_least_s: DELAY_S[0],
+            late_most_s: DELAY_S[1] + METER_S + AGE_S + TICK_S,
+            tick_s: TICK_S,
+            reading_hz: READING_HZ,
+            age_spread_s: METER_S + AGE_S,
+            slope_jitter_s: AGE_S,
+            participation: DELIVERY,
+            participation_absolute: 0.0,
+            hostile_share: 0.0,
+            loss,
+            profile: LossProfile::Constant,
+            initial: [0.02, 0.1, 0.06, 0.06],
+        },
+        last: loss,
+    }
+}
+
+/// Who chooses what the hypotheses leave open.
+#[derive(Debug, Clone, Copy)]
+enum Malice {
+    /// Everything at random, anew each time.
+    Random,
+    /// As little power as possible, as late as possible.
+    LowAndLate,
+    /// As much as possible, as early as possible.
+    HighAndEarly,
+    /// More power while f rises, less while it falls.
+    Pump,
+    /// More, then less, with a half period \[s\].
+    Swing(f64),
+    /// Half the fleet early and half late, errors against each other, delivery with f'.
+    TwoGroups,
+}
+
+struct Charger {
+    response: Response,
+    phase: usize,
+    /// Commands with the moments at which they were decided.
+    commands: Vec<f64>,
+    late: usize,
+}
+
+/// Runs one fleet; the largest share of the way from the middle of the bounds to their edge that f took.
+fn run(seed: u64, malice: Malice, chargers: usize, loss: Interval, found: &Found) -> f64 {
+    let mut rng = Pcg64::seed_from_u64(seed);
+    let plant = plant();
+    let steps_per_tick = (TICK_S / H).round() as usize;
+    let corner = rng.random_bool(0.5);
+    let mut x = [0.02, 0.1, 0.06, 0.06].map(|r: f64| {
+        if corner {
+            if rng.random_bool(0.5) { r } else { -r }
+        } else {
+            r * (2.0 * rng.random::<f64>() - 1.0)
+        }
+    });
+    let w = loss.low + (loss.high - loss.low) * rng.random::<f64>();
+    let mut fleet: Vec<Charger> = (0..chargers)
+        .map(|serial| Charger {
+            response: Response::new(LAW, 100, LevelOffset::of_serial(serial as u32)),
+            phase: rng.random_range(0..steps_per_tick),
+            commands: Vec::new(),
+            late: 0,
+        })
+        .collect();
+    // f at every step, with enough of the rest before the event for meter and slope.
+    let lead = (2.0 / H) as usize;
+    let mut f = vec![x[0]; lead + 1];
+    let window = (METER_S / H).round() as usize;
+    let longest = (DELAY_S[1] / H).round() as usize;
+    let shortest = (DELAY_S[0] / H).round() as usize;
+    let age_most = (AGE_S / H).floor() as usize;
+    let mut worst = 0.0f64;
+    let duration = found.tube.len() as f64 * found.step_s;
+    // The law runs before the event too, so that its window is full.
+    for step in 0..((1.0 + duration) / H) as usize {
+        let t = step as f64 * H - 1.0;
+        let now = f.len() - 1;
+        let falling = f[now] < f[now - 1];
+        let up = match malice {
+            Malice::Random | Malice::TwoGroups => rng.random_bool(0.5),
+            Malice::LowAndLate => false,
+            Malice::HighAndEarly => true,
+            Malice::Pump => !falling,
+            Malice::Swing(half_s) => (t.max(0.0) / half_s) as usize % 2 == 0,
+        };
+        let mut sum = 0.0;
+        for (index, charger) in fleet.iter_mut().enumerate() {
+            let first_group = index * 2 < chargers;
+            let up = match malice {
+                Malice::TwoGroups => first_group == falling,
+                _ => up,
+            };
+            if step % steps_per_tick == charger.phase {
+                let age = if rng.random_bool(0.5) {
+                    age_most
+                } else {
+                    rng.random_range(0..=age_most)
+                };
+                let end = now - age;
+                let mean = f[end - window..=end].iter().sum::<f64>() / (window + 1) as f64;
+                let error = match malice {
+                    Malice::Random => READING_HZ * (2.0 * rng.random::<f64>() - 1.0),
+                    _ if up => -READING_HZ,
+                    _ => READING_HZ,
+                };
+                // A reading as large as the errors allow, rounded towards its mean.
+                let reading = ((mean + 0.99 * error) * 1e6).floor() as i32;
+                let _ = charger.response.step(reading);
+                charger.late = match malice {
+                    Malice::Random => rng.random_range(shortest..=longest),
+                    Malice::LowAndLate => longest,
+                    Malice::HighAndEarly => shortest,
+                    Malice::TwoGroups => {
+                        if first_group {
+                            shortest
+                        } else {
+                            longest
+                        }
+                    }
+                    Malice::Pump | Malice::Swing(_) => longest,
+                };
+            }
+            charger
+                .commands
+                .push(f64::from(charger.response.command().ppm()) / 1e6);
+            let commands = &charger.commands;
+            let back = |late: usize| {
+                commands
+                    .len()
+                    .checked_sub(1 + late)
+                    .map_or(0.0, |at| commands[at])
+            };
+            // An adversary takes whichever command under way suits it.
+            let command = match malice {
+                Malice::Pump | Malice::Swing(_) | Malice::TwoGroups => {
+                    let under_way = (shortest..=longest).map(back);
+                    if up {
+                        under_way.fold(0.0, f64::max)
+                    } else {
+                        under_way.fold(1.0, f64::min)
+                    }
+                }
+                _ => back(charger.late),
+            };
+            let delivery = match malice {
+                Malice::Random => 1.0 + DELIVERY * (2.0 * rng.random::<f64>() - 1.0),
+                _ if up => 1.0 + DELIVERY,
+                _ => 1.0 - DELIVERY,
+            };
+            sum += (command * delivery).min(1.0);
+        }
+        if t < 0.0 {
+            // The rest before the event.
+            f.push(x[0]);
+            continue;
+        }
+        let net = FLEET_GW * sum / chargers as f64 - w;
+        let slope = |x: [f64; 4]| plant.derivative(x, net);
+        let k1 = slope(x);
+        let at = |k: [f64; 4], h: f64| std::array::from_fn(|axis| x[axis] + h * k[axis]);
+        let k2 = slope(at(k1, H / 2.0));
+        let k3 = slope(at(k2, H / 2.0));
+        let k4 = slope(at(k3, H));
+        x = std::array::from_fn(|axis| {
+            x[axis] + H / 6.0 * (k1[axis] + 2.0 * k2[axis] + 2.0 * k3[axis] + k4[axis])
+        });
+        f.push(x[0]);
+        let index = (((t + H) / found.step_s) as usize).min(found.tube.len() - 1);
+        let tube = found.tube[index].join(found.tube[index.saturating_sub(1)]);
+        assert!(
+            tube.contains(x[0]),
+            "seed {seed} {malice:?} {chargers} chargers, {w} GW: f = {} at {t:.3} s, bounds {tube:?}",
+            x[0]
+        );
+        let middle = 0.5 * (tube.low + tube.high);
+        worst = worst.max((x[0] - middle).abs() / (tube.high - middle));
+    }
+    worst
+}
+
+const RESOLUTION: Resolution = Resolution {
+    step_s: 0.05,
+    follow_s: 30.0,
+    memory_s: 25.0,
+};
+
+#[test]
+fn no_fleet_leaves_its_bounds() {
+    let mut closest = 0.0f64;
+    for (number, low) in [0.0, 0.3, 0.8, 1.3, 1.8, 2.16].into_iter().enumerate() {
+        let loss = Interval::hull(low, low + 0.04);
+        let found = examine(&case(loss), RESOLUTION).expect("bounds");
+        for draw in 0..6 {
+            let seed = (number * 100 + draw) as u64;
+            for malice in [
+                Malice::Random,
+                Malice::LowAndLate,
+                Malice::HighAndEarly,
+                Malice::Pump,
+                Malice::Swing(1.0),
+                Malice::Swing(3.0 + draw as f64),
+                Malice::TwoGroups,
+            ] {
+                let chargers = [1, 2, 12][draw % 3];
+                closest = closest.max(run(seed, malice, chargers, loss, &found));
+            }
+        }
+        closest = closest.max(run(9, Malice::Random, 300, loss, &found));
+    }
+    // Bounds that nobody comes near would prove little: someone gets at least half way to the edge.
+    assert!(closest > 0.5, "{closest}");
+    println!("closest: {closest:.3} of the way to the edge of the bounds");
+}
