@@ -53,6 +53,9 @@ pub enum Method {
     /// Tables without Hold: over the horizon.
     #[serde(rename = "tight sets in time")]
     TightSets,
+    /// Tables that are a response: a whole fleet, for ever.
+    #[serde(rename = "bounds of a whole fleet")]
+    FleetBounds,
 }
 
 impl fmt::Display for Method {
@@ -61,6 +64,7 @@ impl fmt::Display for Method {
             Self::NotExplored => "not explored",
             Self::ClosedSet => "closed set of cells",
             Self::TightSets => "tight sets in time",
+            Self::FleetBounds => "bounds of a whole fleet",
         })
     }
 }
@@ -85,6 +89,8 @@ pub enum ClaimName {
     Stay,
     /// Every reachable state has an entry, and lookups are as short as stated.
     Table,
+    /// The meter errs by no more than is assumed.
+    Observer,
 }
 
 impl ClaimName {
@@ -99,6 +105,7 @@ impl ClaimName {
             Self::Settle => "settle",
             Self::Stay => "stay",
             Self::Table => "table",
+            Self::Observer => "observer",
         }
     }
 }
@@ -248,7 +255,12 @@ mod tests {
             let json = serde_json::to_string(&claim).unwrap();
             assert_eq!(json, format!("\"{claim}\""));
         }
-        for method in [Method::NotExplored, Method::ClosedSet, Method::TightSets] {
+        for method in [
+            Method::NotExplored,
+            Method::ClosedSet,
+            Method::TightSets,
+            Method::FleetBounds,
+        ] {
             let json = serde_json::to_string(&method).unwrap();
             assert_eq!(json, format!("\"{method}\""));
         }

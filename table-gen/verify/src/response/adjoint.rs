@@ -136,7 +136,10 @@ impl Past<'_> {
         best: &mut [Choice; 2],
     ) -> Interval {
         let mut ends = [f64::NEG_INFINITY; 2];
-        for (end, side) in [functional.clone(), functional.negated()].iter().enumerate() {
+        for (end, side) in [functional.clone(), functional.negated()]
+            .iter()
+            .enumerate()
+        {
             let first = best[end];
             for choice in std::iter::once(first).chain(tried.iter().copied()) {
                 let bound = self.lower(k, side, choice);
@@ -212,7 +215,13 @@ impl Past<'_> {
             if minus > 0.0 {
                 bound -= minus * above.constant;
                 size += (minus * above.constant).abs();
-                add(&mut waiting, &mut before, i, above.back, -minus * above.slope);
+                add(
+                    &mut waiting,
+                    &mut before,
+                    i,
+                    above.back,
+                    -minus * above.slope,
+                );
                 residual += EPS * (minus * above.slope).abs() * self.most[0];
             }
             // Participations lie in [0, 1], and so does what a line says near the trajectory, up to a few units.

@@ -88,7 +88,9 @@ pub fn examine(case: &Case, resolution: Resolution) -> Option<Found> {
     );
     let event = Event::follow(&settled, window, before, resolution.follow_s, memory);
     let count = event.samples.samples.len();
-    let tube: Vec<Interval> = (0..count.saturating_sub(1)).map(|k| event.tube(k)).collect();
+    let tube: Vec<Interval> = (0..count.saturating_sub(1))
+        .map(|k| event.tube(k))
+        .collect();
     let followed = tube.iter().copied().reduce(Interval::join)?;
     let f = before.map_or(followed, |before| before.tube());
     if f.magnitude() >= F_MOST_HZ || count <= number.steps_up(resolution.follow_s) {

@@ -193,7 +193,10 @@ fn supporting_slope(corners: &[(f64, f64)], side: Side, at: f64) -> f64 {
         Side::Below => 1.0,
         Side::Above => -1.0,
     };
-    let mut sorted: Vec<(f64, f64)> = corners.iter().map(|(z, value)| (*z, sign * value)).collect();
+    let mut sorted: Vec<(f64, f64)> = corners
+        .iter()
+        .map(|(z, value)| (*z, sign * value))
+        .collect();
     sorted.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.total_cmp(&b.1)));
     sorted.dedup_by(|next, kept| next.0 - kept.0 < 1e-12);
     let mut hull: Vec<(f64, f64)> = Vec::with_capacity(sorted.len());

@@ -32,7 +32,7 @@ mod testing;
 mod window;
 
 pub use cases::{Case, Found, Resolution, examine};
+pub use fleet_loop::{Assumed, FleetLoop, Law, LossProfile, PlantBand};
 pub use meter::error_hz;
 pub use plan::{Summary, cases, examine_all};
 pub use proof::{Proof, verify};
-pub use fleet_loop::{Assumed, FleetLoop, Law, LossProfile, PlantBand};

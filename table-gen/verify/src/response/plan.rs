@@ -49,9 +49,7 @@ pub fn cases(all: &Case) -> Vec<Case> {
     let dampings = split(all.plant.damping, DAMPING_CELL_GW_PER_HZ);
     let losses = match all.assumed.profile {
         LossProfile::Band => vec![all.assumed.loss],
-        LossProfile::Constant | LossProfile::NonDecreasing => {
-            split(all.assumed.loss, LOSS_BAND_GW)
-        }
+        LossProfile::Constant | LossProfile::NonDecreasing => split(all.assumed.loss, LOSS_BAND_GW),
     };
     let mut out = Vec::new();
     for inverse_inertia in &inertia_cells {
@@ -169,8 +167,14 @@ mod tests {
         }
         all.plant.inertia = Interval::hull(2.0, 4.0);
         let found = cases(&all);
-        let lowest = found.iter().map(|c| c.plant.inertia.low).fold(9.0, f64::min);
-        let highest = found.iter().map(|c| c.plant.inertia.high).fold(0.0, f64::max);
+        let lowest = found
+            .iter()
+            .map(|c| c.plant.inertia.low)
+            .fold(9.0, f64::min);
+        let highest = found
+            .iter()
+            .map(|c| c.plant.inertia.high)
+            .fold(0.0, f64::max);
         assert!(lowest <= 2.0 && highest >= 4.0);
     }
 }

@@ -58,7 +58,9 @@ pub fn verify(
     let requirements = &spec.requirements;
     let inner = Interval::hull(requirements.inner_hz[0], requirements.inner_hz[1]);
     let enough = |found: &Found| {
-        requirements.containment_hz.is_none_or(|limit| found.f.low >= limit)
+        requirements
+            .containment_hz
+            .is_none_or(|limit| found.f.low >= limit)
             && found.inside_from_s(inner).is_some()
     };
     let summary = examine_all(&all, &enough, go_on).ok_or(VerifyError::Interrupted)?;
@@ -66,7 +68,7 @@ pub fn verify(
     claims.extend(found);
     Ok(Proof {
         claims,
-        method: Method::LinesOfAFleet,
+        method: Method::FleetBounds,
         counts,
     })
 }
@@ -152,7 +154,10 @@ fn case(law: &ResponseLaw, table: &TableView<'_>, spec: &Spec) -> Case {
                 Profile::Band => LossProfile::Band,
             },
             initial: std::array::from_fn(|axis| {
-                initial.lower[axis].abs().max(initial.upper[axis].abs()).next_up()
+                initial.lower[axis]
+                    .abs()
+                    .max(initial.upper[axis].abs())
+                    .next_up()
             }),
         },
         last: loss,
@@ -268,11 +273,11 @@ fn judged(summary: &Summary, spec: &Spec) -> (Vec<Claim>, Counts) {
             let (bound, reason) = match claim.name {
                 ClaimName::Containment => {
                     let low = lowest.map(|(_, found)| found.f.low);
-                    let broken = lowest.filter(|(_, found)| {
-                        claim.limit.is_some_and(|limit| found.f.low < limit)
+                    let broken = lowest
+                        .filter(|(_, found)| claim.limit.is_some_and(|limit| found.f.low < limit));
+                    let reason = broken.map(|(case, found)| {
+                        format!("f >= {:.4} Hz is proven: {}", found.f.low, named(case))
                     });
-                    let reason = broken
-                        .map(|(case, found)| format!("f >= {:.4} Hz is proven: {}", found.f.low, named(case)));
                     (low, reason)
                 }
                 ClaimName::Settle => {
@@ -288,11 +293,18 @@ fn judged(summary: &Summary, spec: &Spec) -> (Vec<Claim>, Counts) {
                 }
                 _ => {
                     let outside = known.iter().find(|(_, found)| {
-                        found.for_ever.is_some_and(|f| f.low < inner.low || f.high > inner.high)
+                        found
+                            .for_ever
+                            .is_some_and(|f| f.low < inner.low || f.high > inner.high)
                     });
                     let reason = outside.map(|(case, found)| {
                         let f = found.for_ever.unwrap_or(found.f);
-                        format!("f in [{:.4}, {:.4}] Hz for ever: {}", f.low, f.high, named(case))
+                        format!(
+                            "f in [{:.4}, {:.4}] Hz for ever: {}",
+                            f.low,
+                            f.high,
+                            named(case)
+                        )
                     });
                     (for_ever.map(|f| f.low), reason)
                 }

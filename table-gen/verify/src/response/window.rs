@@ -196,7 +196,9 @@ impl Samples<'_> {
     fn slope_error(&self, k: usize) -> f64 {
         let assumed = &self.number.assumed;
         let both = 2.0 * (assumed.reading_hz + self.slack(k));
-        let rate = self.largest(k, |sample| sample.rate).max(self.number.rate_before);
+        let rate = self
+            .largest(k, |sample| sample.rate)
+            .max(self.number.rate_before);
         (both + assumed.slope_jitter_s * rate) / self.number.law.slope_window_s * (1.0 + 1e-12)
     }
 
@@ -253,7 +255,10 @@ impl Samples<'_> {
         let assumed = &self.number.assumed;
         let reading = assumed.reading_hz + self.slack(k);
         let held = (window.newest..=window.oldest)
-            .map(|back| self.get(k, back).map_or(Interval::ZERO, |s| s.slope_response))
+            .map(|back| {
+                self.get(k, back)
+                    .map_or(Interval::ZERO, |s| s.slope_response)
+            })
             .reduce(Interval::join)
             .unwrap_or(Interval::ZERO);
         // The release counts from reading to reading, the bounds from what they speak of to what they speak of.
@@ -336,8 +341,8 @@ impl Samples<'_> {
         let number = self.number;
         let [f, g, l, _] = number.chain_most(F_MOST_HZ);
         let lead = number.known.lead_time / number.known.governor_time;
-        let l_rate =
-            (lead.abs() * number.gain_most * f + (1.0 - lead).abs() * g + l) / number.known.lag_time;
+        let l_rate = (lead.abs() * number.gain_most * f + (1.0 - lead).abs() * g + l)
+            / number.known.lag_time;
         let start = sample.map_or(f64::INFINITY, |s| s.turbine.magnitude());
         (start / number.known.turbine_time).max(l_rate) * (1.0 + 1e-9)
     }
