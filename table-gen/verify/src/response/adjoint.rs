@@ -28,54 +28,54 @@ const EPS: f64 = 16.0 * f64::EPSILON;
 
 /// What is known of one step, from sample i to sample i + 1.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Step {
+pub(super) struct Step {
     /// Lines below the delivered participation.
-    pub below: [Line; TOUCHES.len()],
+    pub(super) below: [Line; TOUCHES.len()],
     /// Lines above it.
-    pub above: [Line; TOUCHES.len()],
+    pub(super) above: [Line; TOUCHES.len()],
     /// Bound of |f| in the step \[Hz\].
-    pub f_most: f64,
+    pub(super) f_most: f64,
     /// Bound of `|p + P u - w - D f|` in the step \[GW\].
-    pub net_most: f64,
+    pub(super) net_most: f64,
     /// How far f may leave the chord between the step's samples \[Hz\].
-    pub slack: f64,
+    pub(super) slack: f64,
     /// Bound of |f'| in the step \[Hz/s\].
-    pub rate: f64,
+    pub(super) rate: f64,
 }
 
 /// The steps so far, and what bounds the state where a sweep ends early.
 #[derive(Debug, Clone)]
-pub struct Past<'a> {
+pub(super) struct Past<'a> {
     /// Numbers of the loop.
-    pub loop_: &'a FleetLoop,
+    pub(super) loop_: &'a FleetLoop,
     /// Steps from the event on, or the one step that repeats.
-    pub steps: Vec<Step>,
+    pub(super) steps: Vec<Step>,
     /// Whether `steps` has one element that stands for every step.
-    pub repeats: bool,
+    pub(super) repeats: bool,
     /// Bounds of the states at the samples, or one element for all.
-    pub states: Vec<[Interval; STATES]>,
+    pub(super) states: Vec<[Interval; STATES]>,
     /// Steps after which a sweep ends; 0: it goes back to the event.
-    pub memory: usize,
+    pub(super) memory: usize,
     /// Bound of |x| at all samples.
-    pub most: [f64; STATES],
+    pub(super) most: [f64; STATES],
     /// Bounds of the states before the first sample; nothing: the rest before an event.
-    pub before: Option<[Interval; STATES]>,
+    pub(super) before: Option<[Interval; STATES]>,
 }
 
 /// `row · x(k) + Σ factor · f(k - back) + rate · w`.
 #[derive(Debug, Clone)]
-pub struct Functional {
+pub(super) struct Functional {
     /// Factors of the state.
-    pub row: [f64; STATES],
+    pub(super) row: [f64; STATES],
     /// Factors of earlier samples of f.
-    pub earlier: Vec<(usize, f64)>,
+    pub(super) earlier: Vec<(usize, f64)>,
     /// Factor of the loss at the sample.
-    pub loss: f64,
+    pub(super) loss: f64,
 }
 
 impl Functional {
     /// One state.
-    pub fn state(axis: usize) -> Self {
+    pub(super) fn state(axis: usize) -> Self {
         let mut row = [0.0; STATES];
         row[axis] = 1.0;
         Self {
@@ -86,7 +86,7 @@ impl Functional {
     }
 
     /// f less the f of some steps ago.
-    pub fn change(back: usize) -> Self {
+    pub(super) fn change(back: usize) -> Self {
         Self {
             earlier: vec![(back, -1.0)],
             ..Self::state(0)
@@ -103,10 +103,10 @@ impl Functional {
 }
 
 /// Which lines a sweep uses: indices into [`TOUCHES`] for the lines below and above.
-pub type Choice = (usize, usize);
+pub(super) type Choice = (usize, usize);
 
 /// All choices.
-pub fn choices() -> impl Iterator<Item = Choice> {
+pub(super) fn choices() -> impl Iterator<Item = Choice> {
     (0..TOUCHES.len()).flat_map(|below| (0..TOUCHES.len()).map(move |above| (below, above)))
 }
 
@@ -128,7 +128,7 @@ impl Past<'_> {
     }
 
     /// Bounds of a functional at sample k, with the choices that gave them: the best of those given.
-    pub fn range(
+    pub(super) fn range(
         &self,
         k: usize,
         functional: &Functional,
@@ -156,7 +156,7 @@ impl Past<'_> {
     }
 
     /// A lower bound of a functional at sample k.
-    pub fn lower(&self, k: usize, functional: &Functional, choice: Choice) -> f64 {
+    pub(super) fn lower(&self, k: usize, functional: &Functional, choice: Choice) -> f64 {
         let number = self.loop_;
         let fleet = number.fleet_gw;
         let mut lambda = functional.row;
@@ -167,7 +167,7 @@ impl Past<'_> {
         // Sum of the magnitudes that went into the bound, for its rounding; and residuals.
         let mut size = 0.0f64;
         let mut residual = 0.0f64;
-        let mut add = |waiting: &mut [f64], before: &mut Before, at: usize, back: usize, v: f64| {
+        let add = |waiting: &mut [f64], before: &mut Before, at: usize, back: usize, v: f64| {
             if let Some(sample) = at.checked_sub(back) {
                 waiting[sample] += v;
             } else {

@@ -90,17 +90,17 @@ impl Watched {
 
 /// What is known from the event up to a time.
 #[derive(Debug, Clone)]
-pub struct Event<'a> {
+pub(super) struct Event<'a> {
     /// The samples.
-    pub samples: Samples<'a>,
+    pub(super) samples: Samples<'a>,
     /// The steps and states.
-    pub past: Past<'a>,
+    pub(super) past: Past<'a>,
 }
 
 impl<'a> Event<'a> {
     /// Bounds of every sample up to a time, from rest, or from a state in which the bounds `before` hold and go on to
     /// hold. Ends early where f may leave ±[`F_MOST_HZ`].
-    pub fn follow(
+    pub(super) fn follow(
         number: &'a FleetLoop,
         window: Window,
         before: Option<Reproduced>,
@@ -162,7 +162,7 @@ impl<'a> Event<'a> {
     }
 
     /// Bounds of f in the step that begins at sample k, between the samples too.
-    pub fn tube(&self, k: usize) -> Interval {
+    pub(super) fn tube(&self, k: usize) -> Interval {
         let samples = &self.samples.samples;
         let here = samples.get(k).map_or(Interval::ZERO, |s| s.f);
         let next = samples.get(k + 1).map_or(here, |s| s.f);

@@ -20,7 +20,7 @@ const WIDEN_LEAST: f64 = 1e-5;
 const ROUNDS: usize = 200;
 
 /// Bounds of f for ever, from the moment at which the event was followed last; nothing if none were found.
-pub fn after(event: &Event<'_>, memory: usize) -> Option<Interval> {
+pub(super) fn after(event: &Event<'_>, memory: usize) -> Option<Interval> {
     let samples = &event.samples;
     let first = samples
         .samples
@@ -38,7 +38,7 @@ pub fn after(event: &Event<'_>, memory: usize) -> Option<Interval> {
 }
 
 /// Bounds of f for ever, from rest, whenever the loss rises: R begins as the rest before the event. Nothing if none were found.
-pub fn from_rest(number: &FleetLoop, window: Window, memory: usize) -> Option<Reproduced> {
+pub(super) fn from_rest(number: &FleetLoop, window: Window, memory: usize) -> Option<Reproduced> {
     let state = number.assumed.initial.map(|radius| Interval {
         low: -radius,
         high: radius,
@@ -99,11 +99,11 @@ fn look_back(window: &Window) -> usize {
 
 /// Bounds of one sample and state that hold at every sample.
 #[derive(Debug, Clone, Copy)]
-pub struct Reproduced {
+pub(super) struct Reproduced {
     /// The sample.
-    pub sample: Sample,
+    pub(super) sample: Sample,
     /// The state.
-    pub state: [Interval; 4],
+    pub(super) state: [Interval; 4],
 }
 
 impl Reproduced {
@@ -160,7 +160,7 @@ impl Reproduced {
     }
 
     /// f between the samples too.
-    pub fn tube(&self) -> Interval {
+    pub(super) fn tube(&self) -> Interval {
         Interval {
             low: (self.sample.f.low - self.sample.slack).next_down(),
             high: (self.sample.f.high + self.sample.slack).next_up(),

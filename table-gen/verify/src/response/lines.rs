@@ -23,25 +23,25 @@ use super::fleet_loop::{Assumed, Law};
 use model::interval::Interval;
 
 /// Lines that are kept for each step, by where in the interval of f they touch: at its low end, its middle, its high end.
-pub const TOUCHES: [f64; 3] = [0.001, 0.5, 0.999];
+pub(super) const TOUCHES: [f64; 3] = [0.001, 0.5, 0.999];
 
 /// Far above the rounding errors of the few operations between numbers below 10 that a line takes: a participation.
 const PAD: f64 = 1e-12;
 
 /// `u >= slope * f(k - back) + constant`, or `<=`.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct Line {
+pub(super) struct Line {
     /// Participation per Hz.
-    pub slope: f64,
+    pub(super) slope: f64,
     /// Participation at f = 0.
-    pub constant: f64,
+    pub(super) constant: f64,
     /// The sample that it speaks of, steps before the step's start.
-    pub back: usize,
+    pub(super) back: usize,
 }
 
 /// Which side of the delivered participation a line bounds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Side {
+pub(super) enum Side {
     /// From below.
     Below,
     /// From above.
@@ -50,17 +50,17 @@ pub enum Side {
 
 /// What the fleet delivers at least or at most, as a function of one sample z of f.
 #[derive(Debug, Clone, Copy)]
-pub struct Delivered<'a> {
+pub(super) struct Delivered<'a> {
     /// The law.
-    pub law: &'a Law,
+    pub(super) law: &'a Law,
     /// The assumptions.
-    pub assumed: &'a Assumed,
+    pub(super) assumed: &'a Assumed,
     /// The side.
-    pub side: Side,
+    pub(super) side: Side,
     /// How far the extreme of f in the window may lie from the sample, on the side that counts, reading error included \[Hz\].
-    pub reach_hz: f64,
+    pub(super) reach_hz: f64,
     /// The slope response, on the side that counts.
-    pub slope_response: f64,
+    pub(super) slope_response: f64,
 }
 
 impl Delivered<'_> {
@@ -104,7 +104,7 @@ impl Delivered<'_> {
     }
 
     /// The bound at a sample.
-    pub fn at(&self, z: f64) -> f64 {
+    pub(super) fn at(&self, z: f64) -> f64 {
         let target = self.target(z).clamp(0.0, 1.0);
         let change = self.law.smallest_change;
         let command = match self.side {
@@ -156,7 +156,7 @@ impl Delivered<'_> {
     }
 
     /// Lines on an interval of the sample, one for each of [`TOUCHES`].
-    pub fn lines(&self, range: Interval, back: usize) -> [Line; TOUCHES.len()] {
+    pub(super) fn lines(&self, range: Interval, back: usize) -> [Line; TOUCHES.len()] {
         if self.law.droop <= 0.0 {
             let constant = match self.side {
                 Side::Below => self.at(range.high),

@@ -11,24 +11,24 @@ use super::fleet_loop::{FleetLoop, LossProfile};
 use super::lines::{Delivered, Side};
 
 /// |f| \[Hz\] up to which the bounds of the turbine's rate hold; where f may pass it nothing is claimed.
-pub const F_MOST_HZ: f64 = 1.0;
+pub(super) const F_MOST_HZ: f64 = 1.0;
 
 /// Sample offsets of the window, and of the law's slope.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Window {
+pub(super) struct Window {
     /// Steps from the step's start back to the newest sample.
-    pub newest: usize,
+    pub(super) newest: usize,
     /// Steps back to the oldest sample.
-    pub oldest: usize,
+    pub(super) oldest: usize,
     /// Steps of the slope's window.
-    pub slope: usize,
+    pub(super) slope: usize,
     /// Steps of the longest tick, rounded up.
-    pub tick: usize,
+    pub(super) tick: usize,
 }
 
 impl Window {
     /// The window of a loop; nothing if readings can act within their own step, or the slope's window is not whole steps.
-    pub fn new(number: &FleetLoop) -> Option<Self> {
+    pub(super) fn new(number: &FleetLoop) -> Option<Self> {
         let slope = (number.law.slope_window_s / number.step_s).round();
         let whole = (slope * number.step_s - number.law.slope_window_s).abs() < 1e-9;
         let least = number.steps_down(number.assumed.late_least_s);
@@ -41,39 +41,39 @@ impl Window {
     }
 
     /// Steps from the newest to the oldest sample.
-    pub fn length(&self) -> usize {
+    pub(super) fn length(&self) -> usize {
         self.oldest - self.newest
     }
 }
 
 /// Bounds at one sample.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Sample {
+pub(super) struct Sample {
     /// f.
-    pub f: Interval,
+    pub(super) f: Interval,
     /// f less f one step before.
-    pub change: Interval,
+    pub(super) change: Interval,
     /// f less f half a window before.
-    pub change_half: Interval,
+    pub(super) change_half: Interval,
     /// f less f a window before.
-    pub change_window: Interval,
+    pub(super) change_window: Interval,
     /// f less f a slope window before.
-    pub change_slope: Interval,
+    pub(super) change_slope: Interval,
     /// `p - w - D f`.
-    pub net: Interval,
+    pub(super) net: Interval,
     /// `l - p`, whose share 1/T_t is p'.
-    pub turbine: Interval,
+    pub(super) turbine: Interval,
     /// Bounds of the slope response at readings between this sample and the one before.
-    pub slope_response: Interval,
+    pub(super) slope_response: Interval,
     /// How far f may leave the chord in the step that begins at this sample.
-    pub slack: f64,
+    pub(super) slack: f64,
     /// Bound of |f'| in that step.
-    pub rate: f64,
+    pub(super) rate: f64,
 }
 
 impl Sample {
     /// What two bounds that both hold have in common.
-    pub fn meet(&self, other: &Self) -> Self {
+    pub(super) fn meet(&self, other: &Self) -> Self {
         Self {
             f: meet(self.f, other.f),
             change: meet(self.change, other.change),
@@ -90,7 +90,7 @@ impl Sample {
 }
 
 /// What two intervals that both hold have in common.
-pub fn meet(a: Interval, b: Interval) -> Interval {
+pub(super) fn meet(a: Interval, b: Interval) -> Interval {
     Interval {
         low: a.low.max(b.low),
         high: a.high.min(b.high),
@@ -99,17 +99,17 @@ pub fn meet(a: Interval, b: Interval) -> Interval {
 
 /// Samples by index from the event, or one that stands for all.
 #[derive(Debug, Clone)]
-pub struct Samples<'a> {
+pub(super) struct Samples<'a> {
     /// Numbers of the loop.
-    pub number: &'a FleetLoop,
+    pub(super) number: &'a FleetLoop,
     /// The window.
-    pub window: Window,
+    pub(super) window: Window,
     /// The samples so far.
-    pub samples: Vec<Sample>,
+    pub(super) samples: Vec<Sample>,
     /// Whether one sample stands for all.
-    pub repeats: bool,
+    pub(super) repeats: bool,
     /// Bounds of the samples before the first; nothing: the rest before an event.
-    pub before: Option<Sample>,
+    pub(super) before: Option<Sample>,
 }
 
 impl Samples<'_> {
@@ -188,7 +188,7 @@ impl Samples<'_> {
     }
 
     /// Largest slack of the steps whose samples readings of step k may lie between.
-    pub fn slack(&self, k: usize) -> f64 {
+    pub(super) fn slack(&self, k: usize) -> f64 {
         self.largest(k, |sample| sample.slack)
     }
 
@@ -209,7 +209,7 @@ impl Samples<'_> {
     }
 
     /// Bounds of the slope response at readings up to sample k, from the slopes and the bounds at the sample before.
-    pub fn slope_response(&self, k: usize, change_slope: Interval) -> Interval {
+    pub(super) fn slope_response(&self, k: usize, change_slope: Interval) -> Interval {
         let law = &self.number.law;
         let pad = law.rounding + 1e-12;
         let error = self.slope_error(k);
@@ -250,7 +250,7 @@ impl Samples<'_> {
     }
 
     /// What is known of step k, from its samples.
-    pub fn step(&self, k: usize) -> Step {
+    pub(super) fn step(&self, k: usize) -> Step {
         let window = self.window;
         let assumed = &self.number.assumed;
         let reading = assumed.reading_hz + self.slack(k);

@@ -113,6 +113,7 @@ struct Charger {
     /// Commands with the moments at which they were decided.
     commands: Vec<f64>,
     late: usize,
+    command: f64,
 }
 
 /// Runs one fleet; the largest share of the way from the middle of the bounds to their edge that f took.
@@ -135,6 +136,7 @@ fn run(seed: u64, malice: Malice, chargers: usize, loss: Interval, found: &Found
             phase: rng.random_range(0..steps_per_tick),
             commands: Vec::new(),
             late: 0,
+            command: 0.0,
         })
         .collect();
     // f at every step, with enough of the rest before the event for meter and slope.
@@ -180,7 +182,7 @@ fn run(seed: u64, malice: Malice, chargers: usize, loss: Interval, found: &Found
                 };
                 // A reading as large as the errors allow, rounded towards its mean.
                 let reading = ((mean + 0.99 * error) * 1e6).floor() as i32;
-                let _ = charger.response.step(reading);
+                charger.command = f64::from(charger.response.step(reading).ppm()) / 1e6;
                 charger.late = match malice {
                     Malice::Random => rng.random_range(shortest..=longest),
                     Malice::LowAndLate => longest,
@@ -195,9 +197,7 @@ fn run(seed: u64, malice: Malice, chargers: usize, loss: Interval, found: &Found
                     Malice::Pump | Malice::Swing(_) => longest,
                 };
             }
-            charger
-                .commands
-                .push(f64::from(charger.response.command().ppm()) / 1e6);
+            charger.commands.push(charger.command);
             let commands = &charger.commands;
             let back = |late: usize| {
                 commands
