@@ -1,9 +1,10 @@
-//! The bounds of a fleet under a response, attacked: fleets of single chargers with the firmware's own law, drawn at random and chosen with
-//! malice, never leave them.
+//! The bounds of a fleet under a response, attacked: fleets of single chargers with the firmware's
+//! own law, drawn at random and chosen with malice, never leave them.
 //!
-//! The plant is integrated here by itself (classic Runge-Kutta, 5 ms), the chargers run `firmware::response`; nothing of the verifier is used but
-//! the bounds that it gives. Within the hypotheses everything is drawn anew: clocks, delays that change at every tick, ages and errors of readings,
-//! delivery, the loss, and the state that the event finds.
+//! The plant is integrated here by itself (classic Runge-Kutta, 5 ms), the chargers run
+//! `firmware::response`; nothing of the verifier is used but the bounds that it gives. Within the
+//! hypotheses everything is drawn anew: clocks, delays that change at every tick, ages and errors
+//! of readings, delivery, the loss, and the state that the event finds.
 
 use firmware::response::{LevelOffset, Response, ResponseLaw};
 use model::interval::Interval;
@@ -116,7 +117,8 @@ struct Charger {
     command: f64,
 }
 
-/// Runs one fleet; the largest share of the way from the middle of the bounds to their edge that f took.
+/// Runs one fleet; the largest share of the way from the middle of the bounds to their edge that f
+/// took.
 fn run(seed: u64, malice: Malice, chargers: usize, loss: Interval, found: &Found) -> f64 {
     let mut rng = Pcg64::seed_from_u64(seed);
     let plant = plant();
@@ -158,7 +160,7 @@ fn run(seed: u64, malice: Malice, chargers: usize, loss: Interval, found: &Found
             Malice::LowAndLate => false,
             Malice::HighAndEarly => true,
             Malice::Pump => !falling,
-            Malice::Swing(half_s) => (t.max(0.0) / half_s) as usize % 2 == 0,
+            Malice::Swing(half_s) => ((t.max(0.0) / half_s) as usize).is_multiple_of(2),
         };
         let mut sum = 0.0;
         for (index, charger) in fleet.iter_mut().enumerate() {

@@ -7,15 +7,18 @@
 //! λ(i+1)·x(i+1) = (λ(i+1) E) x(i) + ∫ λ(i+1) exp(A (h - s)) b (P u(s) - w) ds + (what unknown parameters add)
 //! ```
 //!
-//! With β(s) the factor of u in the integral, β+ and β- the integrals of its positive and negative parts, u at least `a f(i-j) + c` and
-//! at most `a' f(i-j') + c'` at all times of the step, the integral is at least `β+ (a f + c) - β- (a' f + c')`: constants go to the bound, the
-//! factors of earlier samples of f are kept until the sweep arrives there and then join λ. The loss is constant, so its factors are summed
-//! and its worst end is taken once; where it may rise, its whole rise is put at the moment at which it does most harm, since for
-//! `w = w0 + Σ rises` the bound is linear in each rise and their sum is limited. The sweep ends at the event, in the box of initial states, or
-//! after a *memory*, in bounds of the state that are known there.
+//! With β(s) the factor of u in the integral, β+ and β- the integrals of its positive and negative
+//! parts, u at least `a f(i-j) + c` and at most `a' f(i-j') + c'` at all times of the step, the
+//! integral is at least `β+ (a f + c) - β- (a' f + c')`: constants go to the bound, the factors of
+//! earlier samples of f are kept until the sweep arrives there and then join λ. The loss is
+//! constant, so its factors are summed and its worst end is taken once; where it may rise, its
+//! whole rise is put at the moment at which it does most harm, since for `w = w0 + Σ rises` the
+//! bound is linear in each rise and their sum is limited. The sweep ends at the event, in the box
+//! of initial states, or after a *memory*, in bounds of the state that are known there.
 //!
-//! λ need not be the exact adjoint: what rounding makes of it is a residual `ε·x(i)`, and |x| is bounded. The constant
-//! [`EPS`] covers sixteen roundings each time, and the residuals are subtracted from the bound.
+//! λ need not be the exact adjoint: what rounding makes of it is a residual `ε·x(i)`, and |x| is
+//! bounded. The constant [`EPS`] covers sixteen roundings each time, and the residuals are
+//! subtracted from the bound.
 
 use model::interval::Interval;
 use model::plant::STATES;
@@ -110,7 +113,8 @@ pub(super) fn choices() -> impl Iterator<Item = Choice> {
     (0..TOUCHES.len()).flat_map(|below| (0..TOUCHES.len()).map(move |above| (below, above)))
 }
 
-/// Factors of samples of f before the first: their sum, the sum of their magnitudes, and what they make of a constant rate.
+/// Factors of samples of f before the first: their sum, the sum of their magnitudes, and what they
+/// make of a constant rate.
 #[derive(Debug, Default)]
 struct Before {
     f: f64,
@@ -127,7 +131,8 @@ impl Past<'_> {
         self.states.get(if self.repeats { 0 } else { index })
     }
 
-    /// Bounds of a functional at sample k, with the choices that gave them: the best of those given.
+    /// Bounds of a functional at sample k, with the choices that gave them: the best of those
+    /// given.
     pub(super) fn range(
         &self,
         k: usize,
@@ -224,10 +229,12 @@ impl Past<'_> {
                 );
                 residual += EPS * (minus * above.slope).abs() * self.most[0];
             }
-            // Participations lie in [0, 1], and so does what a line says near the trajectory, up to a few units.
+            // Participations lie in [0, 1], and so does what a line says near the trajectory, up to
+            // a few units.
             residual += unsure * (fleet * 8.0 + number.assumed.loss.magnitude())
                 + EPS * fleet * absolute * 8.0;
-            // A loss that moves as it likes takes its worst end while its factor is positive, and the other while it is negative.
+            // A loss that moves as it likes takes its worst end while its factor is positive, and
+            // the other while it is negative.
             moving -= 0.5 * ((absolute + mean) * high - (absolute - mean) * low);
             // Within the step the sum lies between its ends, but for what changes sign.
             let ends = loss.min(loss - mean);
@@ -332,11 +339,13 @@ impl Past<'_> {
     }
 }
 
-/// Upper bound of `∫ |β|` over a step for β within `curvature` of the straight line from `start` to `end`.
+/// Upper bound of `∫ |β|` over a step for β within `curvature` of the straight line from `start` to
+/// `end`.
 fn absolute_integral(start: f64, end: f64, curvature: f64, step_s: f64) -> f64 {
     let (a, b) = (start.abs(), end.abs());
     if start * end > 0.0 && a.min(b) > curvature {
-        // No change of sign: the integral's magnitude is that of the mean, which the caller knows exactly.
+        // No change of sign: the integral's magnitude is that of the mean, which the caller knows
+        // exactly.
         return 0.0;
     }
     let chord = if start * end >= 0.0 {

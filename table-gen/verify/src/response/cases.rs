@@ -45,7 +45,8 @@ pub struct Found {
 }
 
 impl Found {
-    /// Time \[s\] after the event from which f is inside a band for ever; nothing if that is not known.
+    /// Time \[s\] after the event from which f is inside a band for ever; nothing if that is not
+    /// known.
     pub fn inside_from_s(&self, band: Interval) -> Option<f64> {
         let within = |f: Interval| band.low <= f.low && f.high <= band.high;
         self.for_ever.filter(|f| within(*f))?;
@@ -54,8 +55,8 @@ impl Found {
     }
 }
 
-/// Bounds for one case; nothing if the resolution does not fit the assumptions (readings that act within their own step, a slope window that is
-/// not whole steps), or if f may leave ±1 Hz.
+/// Bounds for one case; nothing if the resolution does not fit the assumptions (readings that act
+/// within their own step, a slope window that is not whole steps), or if f may leave ±1 Hz.
 pub fn examine(case: &Case, resolution: Resolution) -> Option<Found> {
     let number = FleetLoop::new(&case.plant, case.law, case.assumed, resolution.step_s);
     let window = Window::new(&number)?;
@@ -75,7 +76,8 @@ pub fn examine(case: &Case, resolution: Resolution) -> Option<Found> {
             step_s: resolution.step_s,
         });
     }
-    // After the last rise the loss is constant, in the upper part of its band that the case speaks of.
+    // After the last rise the loss is constant, in the upper part of its band that the case speaks
+    // of.
     let settled = FleetLoop::new(
         &case.plant,
         case.law,

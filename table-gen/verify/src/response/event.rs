@@ -7,7 +7,8 @@ use super::fleet_loop::FleetLoop;
 use super::for_ever::Reproduced;
 use super::window::{F_MOST_HZ, Sample, Samples, Window, meet};
 
-/// Sweeps that are tried beside the one that was best at the sample before: one of all in turn, so that a better one is found soon.
+/// Sweeps that are tried beside the one that was best at the sample before: one of all in turn, so
+/// that a better one is found soon.
 const TRIED: usize = 2;
 
 /// The functionals that are bounded at every sample.
@@ -51,7 +52,8 @@ impl Watched {
         Self { functionals, best }
     }
 
-    /// Bounds of the sample k, without slope response and slack, and of its state. `tried` choices are tried for each.
+    /// Bounds of the sample k, without slope response and slack, and of its state. `tried` choices
+    /// are tried for each.
     pub(super) fn bounds(
         &mut self,
         past: &Past<'_>,
@@ -98,8 +100,8 @@ pub(super) struct Event<'a> {
 }
 
 impl<'a> Event<'a> {
-    /// Bounds of every sample up to a time, from rest, or from a state in which the bounds `before` hold and go on to
-    /// hold. Ends early where f may leave ±[`F_MOST_HZ`].
+    /// Bounds of every sample up to a time, from rest, or from a state in which the bounds `before`
+    /// hold and go on to hold. Ends early where f may leave ±[`F_MOST_HZ`].
     pub(super) fn follow(
         number: &'a FleetLoop,
         window: Window,

@@ -1,7 +1,7 @@
 //! The closed loop of grid and fleet as numbers: what the bounds rest on.
 //!
-//! Frequencies are deviations in Hz, powers in GW, times in s. `f' = (p + P u - w - D f) / 2H` and the governor chain are
-//! the plant's; u is the participation that the fleet delivers.
+//! Frequencies are deviations in Hz, powers in GW, times in s. `f' = (p + P u - w - D f) / 2H` and
+//! the governor chain are the plant's; u is the participation that the fleet delivers.
 
 use model::flow::{self, Flow, Vector};
 use model::interval::Interval;
@@ -69,7 +69,8 @@ pub struct Assumed {
     pub reading_hz: f64,
     /// By how much the age of what readings speak of may differ \[s\].
     pub age_spread_s: f64,
-    /// By how much the time between the two readings of a slope may differ from the law's window \[s\].
+    /// By how much the time between the two readings of a slope may differ from the law's window
+    /// \[s\].
     pub slope_jitter_s: f64,
     /// Relative error of the delivered participation.
     pub participation: f64,
@@ -106,7 +107,8 @@ pub struct FleetLoop {
     pub drive_end: [f64; STATES],
     /// Bound of `|A² exp(A s) b|` within a step.
     pub drive_curvature: [f64; STATES],
-    /// Bound of `|exp(A s) c|` within a step for the unit vector of f: what an unknown inertia or damping acts on.
+    /// Bound of `|exp(A s) c|` within a step for the unit vector of f: what an unknown inertia or
+    /// damping acts on.
     pub spread_f: [f64; STATES],
     /// The same for the direction in which an unknown governor gain acts.
     pub spread_gain: [f64; STATES],
@@ -126,7 +128,8 @@ pub struct FleetLoop {
     pub gain_most: f64,
     /// The plant's known parameters.
     pub known: GridPlant,
-    /// Largest rate of f before the event \[Hz/s\]: what the initial box allows without loss and fleet.
+    /// Largest rate of f before the event \[Hz/s\]: what the initial box allows without loss and
+    /// fleet.
     pub rate_before: f64,
 }
 
@@ -196,8 +199,9 @@ impl FleetLoop {
         (time_s / self.step_s - 1e-9).ceil() as usize
     }
 
-    /// Bounds of |g|, |l|, |p| while |f| stays below a bound: the chain's gains, each a filter without overshoot of what
-    /// comes before it, so that no output passes the larger of its start and its gain times the largest input.
+    /// Bounds of |g|, |l|, |p| while |f| stays below a bound: the chain's gains, each a filter
+    /// without overshoot of what comes before it, so that no output passes the larger of its start
+    /// and its gain times the largest input.
     pub fn chain_most(&self, f_most: f64) -> [f64; STATES] {
         let [_, g0, l0, p0] = self.assumed.initial;
         let lead = self.known.lead_time / self.known.governor_time;

@@ -1,10 +1,12 @@
 //! For ever: bounds that reproduce themselves.
 //!
 //! # Derivation
-//! Let R be bounds of all watched functionals at one sample, and suppose that they held at every sample of the last M + W steps, M the
-//! memory and W the steps that lines and slopes look back. From R follow lines that bound the fleet in each of these steps, and a sweep
-//! over M steps that ends in R's bounds of the state bounds each functional at the next sample. If those lie inside R, then R holds at the next
-//! sample too, and by induction at all later ones. R begins as what was found over the last M + W steps after the event.
+//! Let R be bounds of all watched functionals at one sample, and suppose that they held at every
+//! sample of the last M + W steps, M the memory and W the steps that lines and slopes look back.
+//! From R follow lines that bound the fleet in each of these steps, and a sweep over M steps that
+//! ends in R's bounds of the state bounds each functional at the next sample. If those lie inside
+//! R, then R holds at the next sample too, and by induction at all later ones. R begins as what was
+//! found over the last M + W steps after the event.
 
 use model::interval::Interval;
 
@@ -13,13 +15,15 @@ use super::event::{Event, Watched};
 use super::fleet_loop::FleetLoop;
 use super::window::{F_MOST_HZ, Sample, Samples, Window, meet};
 
-/// By how much R is widened where it did not reproduce itself, relative to its width and at least \[Hz or GW\].
+/// By how much R is widened where it did not reproduce itself, relative to its width and at least
+/// \[Hz or GW\].
 const WIDEN: f64 = 0.02;
 const WIDEN_LEAST: f64 = 1e-5;
 /// Attempts.
 const ROUNDS: usize = 200;
 
-/// Bounds of f for ever, from the moment at which the event was followed last; nothing if none were found.
+/// Bounds of f for ever, from the moment at which the event was followed last; nothing if none were
+/// found.
 pub(super) fn after(event: &Event<'_>, memory: usize) -> Option<Interval> {
     let samples = &event.samples;
     let first = samples
@@ -37,7 +41,8 @@ pub(super) fn after(event: &Event<'_>, memory: usize) -> Option<Interval> {
     reproduced(samples.number, samples.window, memory, sample, state).map(|b| b.tube())
 }
 
-/// Bounds of f for ever, from rest, whenever the loss rises: R begins as the rest before the event. Nothing if none were found.
+/// Bounds of f for ever, from rest, whenever the loss rises: R begins as the rest before the event.
+/// Nothing if none were found.
 pub(super) fn from_rest(number: &FleetLoop, window: Window, memory: usize) -> Option<Reproduced> {
     let state = number.assumed.initial.map(|radius| Interval {
         low: -radius,
@@ -74,7 +79,8 @@ pub(super) fn from_rest(number: &FleetLoop, window: Window, memory: usize) -> Op
     for _ in 0..ROUNDS {
         let (found, found_state) = bounds.next(number, window, memory);
         let before = bounds.sample.f;
-        // What held before holds still; the slope response follows from the slope, and was 0 at rest.
+        // What held before holds still; the slope response follows from the slope, and was 0 at
+        // rest.
         let sample = Sample {
             slope_response: Interval::ZERO,
             ..bounds.sample.meet(&found)
@@ -150,7 +156,8 @@ impl Reproduced {
 
     /// Whether the next sample's bounds lie inside these.
     fn holds(&self, sample: &Sample, state: &[Interval; 4]) -> bool {
-        // Slack and rate enter the lines by way of the readings: they must not be larger than what was assumed.
+        // Slack and rate enter the lines by way of the readings: they must not be larger than what
+        // was assumed.
         sample.slack <= self.sample.slack
             && sample.rate <= self.sample.rate
             && pairs(&self.sample, sample)
@@ -193,8 +200,8 @@ fn reproduced(
     None
 }
 
-/// An interval as it is where it holds what was found; else both, a little wider. What holds is not widened: the others
-/// depend on it.
+/// An interval as it is where it holds what was found; else both, a little wider. What holds is not
+/// widened: the others depend on it.
 fn grow(outer: Interval, found: Interval) -> Interval {
     let by = (outer.high - outer.low) * WIDEN + WIDEN_LEAST;
     Interval {

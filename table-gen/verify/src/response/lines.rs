@@ -1,31 +1,36 @@
 //! Straight lines below and above what the fleet delivers.
 //!
 //! # Derivation
-//! At time t each charger draws what it decided at some moment, on a reading that speaks of a moment s between
-//! `late_most_s` and `late_least_s` before t. Its command c obeys |c - v| < smallest_change, and c = v where v is 0 or 1;
-//! v is the law's target, `clamp(droop (setpoint - f(s) - e) + m, 0, 1)` with the reading's error e and the slope response m.
-//! v falls with f and rises with m. So whatever the clocks, delays and errors of the single chargers, every command, and
-//! with it the fleet's mean, lies between
+//! At time t each charger draws what it decided at some moment, on a reading that speaks of a
+//! moment s between `late_most_s` and `late_least_s` before t. Its command c obeys |c - v| <
+//! smallest_change, and c = v where v is 0 or 1; v is the law's target, `clamp(droop (setpoint -
+//! f(s) - e) + m, 0, 1)` with the reading's error e and the slope response m. v falls with f and
+//! rises with m. So whatever the clocks, delays and errors of the single chargers, every command,
+//! and with it the fleet's mean, lies between
 //!
 //! ```text
 //! low(max f(s), least m)     low(z, m)  = v = 1 ? 1 : max(0, v - smallest_change),   v at z + reading
 //! high(min f(s), most m)     high(z, m) = v = 0 ? 0 : min(1, v + smallest_change),   v at z - reading
 //! ```
 //!
-//! and the delivered participation between `(1 - σ)(1 - δ) low - α` and `(1 - σ) high (1 + δ) + α + σ`, inside \[0, 1\]: σ the
-//! hostile share, δ and α the relative and absolute errors of the delivery.
+//! and the delivered participation between `(1 - σ)(1 - δ) low - α` and `(1 - σ) high (1 + δ) + α +
+//! σ`, inside \[0, 1\]: σ the hostile share, δ and α the relative and absolute errors of the
+//! delivery.
 //!
-//! Both are piecewise linear in z with one jump. A line that lies below (above) the function at the ends of an interval, at its
-//! kinks and at the lower (upper) side of its jump lies below (above) it on the whole interval; the supporting lines of the
-//! convex hull of those points are such lines. Which of them is best depends on where the worst trajectory runs, so several are kept.
+//! Both are piecewise linear in z with one jump. A line that lies below (above) the function at the
+//! ends of an interval, at its kinks and at the lower (upper) side of its jump lies below (above)
+//! it on the whole interval; the supporting lines of the convex hull of those points are such
+//! lines. Which of them is best depends on where the worst trajectory runs, so several are kept.
 
 use super::fleet_loop::{Assumed, Law};
 use model::interval::Interval;
 
-/// Lines that are kept for each step, by where in the interval of f they touch: at its low end, its middle, its high end.
+/// Lines that are kept for each step, by where in the interval of f they touch: at its low end, its
+/// middle, its high end.
 pub(super) const TOUCHES: [f64; 3] = [0.001, 0.5, 0.999];
 
-/// Far above the rounding errors of the few operations between numbers below 10 that a line takes: a participation.
+/// Far above the rounding errors of the few operations between numbers below 10 that a line takes:
+/// a participation.
 const PAD: f64 = 1e-12;
 
 /// `u >= slope * f(k - back) + constant`, or `<=`.
@@ -57,7 +62,8 @@ pub(super) struct Delivered<'a> {
     pub(super) assumed: &'a Assumed,
     /// The side.
     pub(super) side: Side,
-    /// How far the extreme of f in the window may lie from the sample, on the side that counts, reading error included \[Hz\].
+    /// How far the extreme of f in the window may lie from the sample, on the side that counts,
+    /// reading error included \[Hz\].
     pub(super) reach_hz: f64,
     /// The slope response, on the side that counts.
     pub(super) slope_response: f64,
@@ -116,7 +122,8 @@ impl Delivered<'_> {
         self.delivered(command)
     }
 
-    /// The points whose hull bounds the function on an interval: ends, kinks, and the outer side of the jump.
+    /// The points whose hull bounds the function on an interval: ends, kinks, and the outer side of
+    /// the jump.
     fn corners(&self, range: Interval) -> Vec<(f64, f64)> {
         let change = self.law.smallest_change;
         let assumed = self.assumed;
@@ -172,7 +179,8 @@ impl Delivered<'_> {
         TOUCHES.map(|share| {
             let at = range.low + (range.high - range.low) * share;
             let slope = supporting_slope(&corners, self.side, at);
-            // The constant comes from all corners, so the line bounds them whatever the slope's rounding.
+            // The constant comes from all corners, so the line bounds them whatever the slope's
+            // rounding.
             let offsets = corners.iter().map(|(z, value)| value - slope * z);
             let constant = match self.side {
                 Side::Below => offsets.fold(f64::INFINITY, f64::min) - PAD,
@@ -262,7 +270,8 @@ mod tests {
             reach_hz: 0.002,
             slope_response: 0.0,
         };
-        // 6 / 1.4 * (0.05 - 0.002) falls short of 1 by far at -0.05 - ...; at -0.35 Hz the target is 1.27.
+        // 6 / 1.4 * (0.05 - 0.002) falls short of 1 by far at -0.05 - ...; at -0.35 Hz the target
+        // is 1.27.
         let line = below.lines(Interval::hull(-0.5, -0.35), 2)[1];
         assert!(line.slope.abs() < 1e-9);
         assert!((line.constant - 0.9).abs() < 1e-9, "{line:?}");

@@ -9,9 +9,11 @@
 //! | resolution of the timer or the chip | itself |
 //! | constant bias | itself |
 //!
-//! f is at most 55 Hz here. Cycles over time is the mean of f over the window, and a mean of a continuous function is its value at some
-//! moment of the window: so a reading speaks exactly of a moment between its age and its age plus T ago, which counts as delay. The difference
-//! of two readings is, in the same way, the exact difference of f at two moments that lie a slope window apart, but for their ages.
+//! f is at most 55 Hz here. Cycles over time is the mean of f over the window, and a mean of a
+//! continuous function is its value at some moment of the window: so a reading speaks exactly of a
+//! moment between its age and its age plus T ago, which counts as delay. The difference of two
+//! readings is, in the same way, the exact difference of f at two moments that lie a slope window
+//! apart, but for their ages.
 
 use model::spec::{MeterKind, Spec};
 use model::verdict::{Claim, ClaimName};

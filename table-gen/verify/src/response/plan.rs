@@ -8,13 +8,14 @@ use super::fleet_loop::{LossProfile, PlantBand};
 
 /// Width of a band of the loss \[GW\].
 const LOSS_BAND_GW: f64 = 0.04;
-/// Widths of the cells of unknown parameters: 1/H relative to its middle, K relative to it, D \[GW/Hz\].
+/// Widths of the cells of unknown parameters: 1/H relative to its middle, K relative to it, D
+/// \[GW/Hz\].
 const INERTIA_CELL: f64 = 0.06;
 const GAIN_CELL: f64 = 0.06;
 const DAMPING_CELL_GW_PER_HZ: f64 = 0.2;
 
-/// How finely cases are followed, in turn until one is good enough. A loss that moves may jump within a step, so its
-/// steps are short from the first.
+/// How finely cases are followed, in turn until one is good enough. A loss that moves may jump
+/// within a step, so its steps are short from the first.
 const CONSTANT: [Resolution; 2] = [
     Resolution {
         step_s: 0.05,
@@ -59,7 +60,8 @@ pub fn cases(all: &Case) -> Vec<Case> {
                     let point = inverse_inertia.low == inverse_inertia.high;
                     let mut case = *all;
                     case.plant = PlantBand {
-                        // A point stays that point; else outward, since the reciprocal is rounded twice.
+                        // A point stays that point; else outward, since the reciprocal is rounded
+                        // twice.
                         inertia: if point {
                             *inertia
                         } else {
@@ -109,8 +111,8 @@ fn split(range: Interval, width: f64) -> Vec<Interval> {
 /// Cases that are examined between two reports of progress.
 const TOGETHER: usize = 8;
 
-/// Examines all cases, on all threads, more finely where what was found is not `enough`. `go_on` is told the share that is
-/// done and may end it: then nothing comes back.
+/// Examines all cases, on all threads, more finely where what was found is not `enough`. `go_on` is
+/// told the share that is done and may end it: then nothing comes back.
 pub fn examine_all(
     all: &Case,
     enough: &(dyn Fn(&Found) -> bool + Sync),

@@ -1,6 +1,7 @@
 //! From the bytes of a table to the claims of its spec.
 //!
-//! What the fleet does is read off the table: the law's integers and the hypotheses of the header. What the grid does is the spec's.
+//! What the fleet does is read off the table: the law's integers and the hypotheses of the header.
+//! What the grid does is the spec's.
 
 use firmware::response::ResponseLaw;
 use firmware::table::{Hypotheses, LossProfile as Profile, TableView};
@@ -27,7 +28,8 @@ pub struct Proof {
     pub counts: Counts,
 }
 
-/// Examines the response of a table against a spec. `go_on` is told how much is done, in \[0, 1\], and may end it.
+/// Examines the response of a table against a spec. `go_on` is told how much is done, in \[0, 1\],
+/// and may end it.
 ///
 /// # Errors
 /// A part of the spec that is not covered, or an end by `go_on`. A claim that fails is a result.
@@ -136,7 +138,8 @@ fn case(law: &ResponseLaw, table: &TableView<'_>, spec: &Spec) -> Case {
         },
         law: real_law(law, tick_s, tick_most_s),
         assumed: Assumed {
-            // The lag is half the meter's window and the age: a reading is f at some moment of its window.
+            // The lag is half the meter's window and the age: a reading is f at some moment of its
+            // window.
             late_least_s: delay_least,
             late_most_s: lag_least + lag_most + delay_most + tick_most_s,
             tick_s: tick_most_s,

@@ -1,8 +1,9 @@
 //! What the bounds of past samples say of the window in which the fleet's readings lie.
 //!
-//! During step i, from `t` to `t + h`, the fleet acts on readings of moments between `t - late_most` and `t + h - late_least`: on samples
-//! `i - newest` to `i - oldest` and what lies between them. Between two samples f leaves their chord by at most `h/4` times the variation of f'
-//! in the step (`slack`).
+//! During step i, from `t` to `t + h`, the fleet acts on readings of moments between `t -
+//! late_most` and `t + h - late_least`: on samples `i - newest` to `i - oldest` and what lies
+//! between them. Between two samples f leaves their chord by at most `h/4` times the variation of
+//! f' in the step (`slack`).
 
 use model::interval::Interval;
 
@@ -27,7 +28,8 @@ pub(super) struct Window {
 }
 
 impl Window {
-    /// The window of a loop; nothing if readings can act within their own step, or the slope's window is not whole steps.
+    /// The window of a loop; nothing if readings can act within their own step, or the slope's
+    /// window is not whole steps.
     pub(super) fn new(number: &FleetLoop) -> Option<Self> {
         let slope = (number.law.slope_window_s / number.step_s).round();
         let whole = (slope * number.step_s - number.law.slope_window_s).abs() < 1e-9;
@@ -208,7 +210,8 @@ impl Samples<'_> {
         (law.slope * (-slope_hz_per_s - law.slope_threshold_hz_per_s)).clamp(0.0, law.slope_most)
     }
 
-    /// Bounds of the slope response at readings up to sample k, from the slopes and the bounds at the sample before.
+    /// Bounds of the slope response at readings up to sample k, from the slopes and the bounds at
+    /// the sample before.
     pub(super) fn slope_response(&self, k: usize, change_slope: Interval) -> Interval {
         let law = &self.number.law;
         let pad = law.rounding + 1e-12;
@@ -261,7 +264,8 @@ impl Samples<'_> {
             })
             .reduce(Interval::join)
             .unwrap_or(Interval::ZERO);
-        // The release counts from reading to reading, the bounds from what they speak of to what they speak of.
+        // The release counts from reading to reading, the bounds from what they speak of to what
+        // they speak of.
         let aged = self.number.law.release_per_s * assumed.age_spread_s;
         let middle = window.newest.midpoint(window.oldest);
         // How far the highest (lowest) f of the window may lie above (below) a sample of it.
@@ -336,7 +340,8 @@ impl Samples<'_> {
         }
     }
 
-    /// Bound of |p'| in the step after a sample: p' is filtered l', so it passes neither its start nor the largest |l'|.
+    /// Bound of |p'| in the step after a sample: p' is filtered l', so it passes neither its start
+    /// nor the largest |l'|.
     fn turbine_rate(&self, sample: Option<&Sample>) -> f64 {
         let number = self.number;
         let [f, g, l, _] = number.chain_most(F_MOST_HZ);
@@ -347,8 +352,8 @@ impl Samples<'_> {
         (start / number.known.turbine_time).max(l_rate) * (1.0 + 1e-9)
     }
 
-    /// How far f may leave the chord in a step: a quarter of the step times the variation of f' in it, which the
-    /// participation's spread, a rise of the loss, the turbine and the damping make.
+    /// How far f may leave the chord in a step: a quarter of the step times the variation of f' in
+    /// it, which the participation's spread, a rise of the loss, the turbine and the damping make.
     fn slack_of(&self, sample: Option<&Sample>, spread: f64, net_most: f64) -> f64 {
         let number = self.number;
         let smooth = number.step_s
