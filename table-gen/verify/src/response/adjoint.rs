@@ -4,7 +4,8 @@
 //! Let `q·x(k) + Σ c_j f(k - j)` be the functional. For *any* row vectors λ, the sum telescopes:
 //!
 //! ```text
-//! λ(i+1)·x(i+1) = (λ(i+1) E) x(i) + ∫ λ(i+1) exp(A (h - s)) b (P u(s) - w) ds + (what unknown parameters add)
+//! λ(i+1)·x(i+1) = (λ(i+1) E) x(i) + ∫ λ(i+1) exp(A (h - s)) b (P u(s) - w) ds
+//!                  + (what unknown parameters add)
 //! ```
 //!
 //! With β(s) the factor of u in the integral, β+ and β- the integrals of its positive and negative

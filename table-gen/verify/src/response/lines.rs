@@ -9,8 +9,8 @@
 //! and with it the fleet's mean, lies between
 //!
 //! ```text
-//! low(max f(s), least m)     low(z, m)  = v = 1 ? 1 : max(0, v - smallest_change),   v at z + reading
-//! high(min f(s), most m)     high(z, m) = v = 0 ? 0 : min(1, v + smallest_change),   v at z - reading
+//! low(max f(s), least m)   low(z, m)  = v = 1 ? 1 : max(0, v - smallest_change), v at z + reading
+//! high(min f(s), most m)   high(z, m) = v = 0 ? 0 : min(1, v + smallest_change), v at z - reading
 //! ```
 //!
 //! and the delivered participation between `(1 - σ)(1 - δ) low - α` and `(1 - σ) high (1 + δ) + α +

@@ -11,7 +11,7 @@ use super::adjoint::Step;
 use super::fleet_loop::{FleetLoop, LossProfile};
 use super::lines::{Delivered, Side};
 
-/// |f| \[Hz\] up to which the bounds of the turbine's rate hold; where f may pass it nothing is claimed.
+/// |f| \[Hz\] up to which the bounds of the turbine's rate hold; past it nothing is claimed.
 pub(super) const F_MOST_HZ: f64 = 1.0;
 
 /// Sample offsets of the window, and of the law's slope.
