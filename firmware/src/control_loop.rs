@@ -17,7 +17,7 @@
 //! command notes it: [`ControlLoop::step`], [`ControlLoop::step_or`] and [`ControlLoop::command`].
 
 use crate::droop::Droop;
-use crate::phase::{Phase, PhaseState, Step};
+use crate::phase::{Decision, Phase, PhaseState};
 use crate::prediction::{DELAY_TICKS_MAX, History};
 use crate::response::{LevelOffset, Response};
 use crate::table::{Header, TableError, TableView};
@@ -157,8 +157,8 @@ impl<'t> ControlLoop<'t> {
         let (next, step) = self.state.step_ahead(table, state, ahead);
         self.state = next;
         let (participation, source) = match step {
-            Step::Level(level) => (table.header().participation(level), Source::Table),
-            Step::Outside => (self.droop.participation(state), Source::DroopOutside),
+            Decision::Level(level) => (table.header().participation(level), Source::Table),
+            Decision::Outside => (self.droop.participation(state), Source::DroopOutside),
         };
         Action {
             participation,

@@ -11,7 +11,7 @@
 //! | Hold | with `stay`: the safety law covers the state | every period, counted from the switch |
 //!
 //! A *decision* tries the laws in the order Hold, Fixed, C2, C1 and takes the first that applies
-//! and has an entry for the cell. With none, the answer is [`Step::Outside`] and the next tick
+//! and has an entry for the cell. With none, the answer is [`Decision::Outside`] and the next tick
 //! decides again: the caller runs the baseline droop meanwhile.
 
 use crate::table::{Law, TableView};
@@ -70,7 +70,7 @@ impl Phase {
 
 /// What a tick decided.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Step {
+pub enum Decision {
     /// Apply this input level.
     Level(u8),
     /// No law has an entry for the state.
@@ -100,7 +100,7 @@ impl PhaseState {
     /// Advances by one tick with the state measured at it; pure, so that the verifier can call it
     /// on any state.
     #[must_use]
-    pub fn step(self, table: &TableView<'_>, state: State) -> (Self, Step) {
+    pub fn step(self, table: &TableView<'_>, state: State) -> (Self, Decision) {
         self.step_ahead(table, state, || state)
     }
 
@@ -113,28 +113,28 @@ impl PhaseState {
         table: &TableView<'_>,
         measured: State,
         ahead: impl FnOnce() -> State,
-    ) -> (Self, Step) {
+    ) -> (Self, Decision) {
         let header = table.header();
         match self.phase {
             // Chargers can only answer a fall: above I1 there is nothing to do before the event.
             Phase::NoControl if measured.frequency_uhz() >= header.outer.low_uhz => {
-                (self, Step::Level(self.level))
+                (self, Decision::Level(self.level))
             }
             Phase::C1 | Phase::C2 | Phase::Hold if self.ticks_left > 0 => {
                 let ticks_left = self.ticks_left - 1;
-                (Self { ticks_left, ..self }, Step::Level(self.level))
+                (Self { ticks_left, ..self }, Decision::Level(self.level))
             }
             _ => {
                 let state = ahead();
                 if self.phase == Phase::Fixed && header.inner.contains(state) {
-                    return (self, Step::Level(self.level));
+                    return (self, Decision::Level(self.level));
                 }
                 self.decide(table, state)
             }
         }
     }
 
-    fn decide(self, table: &TableView<'_>, state: State) -> (Self, Step) {
+    fn decide(self, table: &TableView<'_>, state: State) -> (Self, Decision) {
         let header = table.header();
         let cell = header.grid.quantise(state);
         let law = |law: Law| cell.and_then(|cell| table.lookup(law, cell));
@@ -146,7 +146,7 @@ impl PhaseState {
                 level,
                 ticks_left,
             };
-            (next, Step::Level(level))
+            (next, Decision::Level(level))
         };
         if let Some(level) = law(Law::Hold) {
             return held(Phase::Hold, level);
@@ -157,7 +157,7 @@ impl PhaseState {
                 level: self.level,
                 ticks_left: 0,
             };
-            return (next, Step::Level(self.level));
+            return (next, Decision::Level(self.level));
         }
         if header.outer.contains(state)
             && let Some(level) = law(Law::C2)
@@ -172,6 +172,6 @@ impl PhaseState {
             level: self.level,
             ticks_left: 0,
         };
-        (next, Step::Outside)
+        (next, Decision::Outside)
     }
 }

@@ -10,7 +10,7 @@ use std::collections::VecDeque;
 use firmware::fault::Mode;
 use firmware::link::session::{Session, Wires};
 use firmware::link::{Mains, Request, Response, Setup, SourceKind};
-use firmware::phase::{Phase, PhaseState, Step};
+use firmware::phase::{Decision, Phase, PhaseState};
 use firmware::prediction::History;
 use firmware::table::TableView;
 use firmware::units::State;
@@ -245,7 +245,7 @@ fn follow(table: &TableView<'_>, ticks: &[Tick]) -> (u32, u32) {
         }
         state = next;
         assert_eq!(now.phase, next.phase.number(), "{now:?}");
-        if let Step::Level(level) = step {
+        if let Decision::Level(level) = step {
             assert_eq!(now.share_ppm, step_ppm * u32::from(level), "{now:?}");
         }
     }

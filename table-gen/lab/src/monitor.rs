@@ -7,6 +7,7 @@ use std::fmt::Write as _;
 use std::io::{self, Read, Write};
 
 use firmware::fault::{Faults, Mode};
+use firmware::phase::Phase;
 use firmware::telemetry::{DecodeError, FRAME_MAX, Frame, WireSetPoint, decode};
 use serde::Serialize;
 
@@ -62,8 +63,10 @@ pub struct Summary {
     pub other_version: u64,
 }
 
-/// Phases by their numbers in a frame.
-const PHASES: [&str; 6] = ["no control", "C1", "C2", "Fixed", "Hold", "fallback"];
+fn phase_name(phase: u8) -> &'static str {
+    let known = Phase::ALL.get(usize::from(phase)).copied();
+    known.map_or("?", Phase::name)
+}
 
 fn mode_name(mode: u8) -> &'static str {
     match Mode::ALL.get(usize::from(mode)) {
@@ -120,7 +123,7 @@ pub fn line(frame: &Frame) -> String {
         NOMINAL_HZ + f,
         f64::from(frame.participation_ppm) * 1e-4,
         set_point(frame.set_point),
-        PHASES.get(usize::from(frame.phase)).unwrap_or(&"?"),
+        phase_name(frame.phase),
         mode_name(frame.mode),
         fault_names(frame.faults),
     );

@@ -11,7 +11,7 @@
 //! - Hold leads to Hold only;
 //! - and the longest path of C1 and C2 cells is the worst number of periods until Hold ([`longest_path`]).
 
-use firmware::phase::{Phase, PhaseState, Step};
+use firmware::phase::{Decision, Phase, PhaseState};
 use firmware::table::TableView;
 use rayon::prelude::*;
 
@@ -175,11 +175,11 @@ impl Closed<'_> {
             };
             let (next, step) = before.step(self.table, state);
             let held = match step {
-                Step::Level(level) => {
+                Decision::Level(level) => {
                     let drive = self.model.drives.get(usize::from(level)).copied();
                     drive.zip(knowledge.drifts.get(usize::from(level)))
                 }
-                Step::Outside => None,
+                Decision::Outside => None,
             };
             let Some((drive, drift)) = held.filter(|_| next.phase != Phase::Fixed) else {
                 let what = "no law has an entry for a reachable cell".to_owned();

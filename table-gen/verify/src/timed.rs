@@ -11,7 +11,7 @@
 
 use std::collections::{BTreeMap, HashMap, HashSet};
 
-use firmware::phase::{Phase, PhaseState, Step};
+use firmware::phase::{Decision, Phase, PhaseState};
 use firmware::table::TableView;
 use firmware::units::State;
 
@@ -56,7 +56,7 @@ struct Decided {
     age: Age,
     part: Part,
     next: PhaseState,
-    step: Step,
+    step: Decision,
 }
 
 /// The exploration.
@@ -263,7 +263,7 @@ impl<'a> Timed<'a> {
             set: one.part.set.hull_f(),
         };
         let trace = self.traces.push(Some(one.trace), at);
-        let Step::Level(level) = one.step else {
+        let Decision::Level(level) = one.step else {
             let what = "no law has an entry for the state";
             self.tally
                 .violate(Violation::Uncovered, what, trace, &self.traces);

@@ -6,7 +6,7 @@
 use std::collections::BTreeMap;
 
 use firmware::grid::Cell;
-use firmware::phase::{Phase, PhaseState, Step};
+use firmware::phase::{Decision, Phase, PhaseState};
 use firmware::table::TableView;
 use firmware::units::{AXIS_F, State};
 
@@ -205,7 +205,7 @@ impl Watching<'_> {
     }
 
     /// What the machine decides at the trigger on a state of the first decision.
-    fn ask(&self, state: State) -> (PhaseState, Step) {
+    fn ask(&self, state: State) -> (PhaseState, Decision) {
         if self.model.knowledge.delay.is_none() {
             return PhaseState::INITIAL.step(self.table, state);
         }
@@ -245,7 +245,7 @@ impl Watching<'_> {
         let index = cell.and_then(|cell| grid.index(cell));
         let (next, step) = self.ask(measured);
         let known = index.is_some_and(|index| out.seen.contains(index));
-        if next == PhaseState::INITIAL || (known && step != Step::Outside) {
+        if next == PhaseState::INITIAL || (known && step != Decision::Outside) {
             return;
         }
         let at = PathStep {
@@ -257,7 +257,7 @@ impl Watching<'_> {
         };
         let trace = out.traces.push(Some(parent), at);
         match (index, step) {
-            (Some(index), Step::Level(_)) => {
+            (Some(index), Decision::Level(_)) => {
                 out.seen.insert(index);
                 out.seeds.insert(index, trace);
             }

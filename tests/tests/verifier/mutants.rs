@@ -1,6 +1,6 @@
 //! Tables and specs that are wrong in one place: each must be rejected, and for the right claim.
 
-use firmware::phase::{Phase, PhaseState, Step};
+use firmware::phase::{Decision, Phase, PhaseState};
 use firmware::table::{HEADER_LEN, Header, Law, LawEntry, TableView, seal, write_header};
 
 use lab::falsify::adversaries::Constant;
@@ -42,7 +42,8 @@ fn decisions(bytes: &[u8], spec: &Spec, ticks: u32) -> Vec<(Phase, [u16; 4], u8)
         let (next, step) = state.step(&table, measured);
         if decides
             && next.phase != Phase::NoControl
-            && let (Some(cell), Step::Level(level)) = (table.header().grid.quantise(measured), step)
+            && let (Some(cell), Decision::Level(level)) =
+                (table.header().grid.quantise(measured), step)
         {
             out.push((next.phase, cell.0, level));
         }

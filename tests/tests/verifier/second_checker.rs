@@ -7,7 +7,7 @@
 
 use std::collections::{BTreeSet, VecDeque};
 
-use firmware::phase::{Phase, PhaseState, Step};
+use firmware::phase::{Decision, Phase, PhaseState};
 use firmware::table::TableView;
 use firmware::units::State;
 
@@ -137,7 +137,7 @@ fn a_second_checker_agrees_on_a_small_table() {
             ticks_left: 0,
         };
         let (next, step) = before.step(&table, state);
-        let Step::Level(level) = step else {
+        let Decision::Level(level) = step else {
             panic!("{cell:?} has no entry");
         };
         let power = drive(&spec, level);

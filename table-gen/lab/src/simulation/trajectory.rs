@@ -40,22 +40,9 @@ pub struct Run {
     pub summary: Summary,
 }
 
-/// Name of a phase in reports and JSON.
-pub fn phase_name(phase: Phase) -> &'static str {
-    match phase {
-        Phase::NoControl => "no-control",
-        Phase::C1 => "C1",
-        Phase::C2 => "C2",
-        Phase::Fixed => "fixed",
-        Phase::Hold => "hold",
-        Phase::Fallback => "fallback",
-        Phase::Response => "response",
-    }
-}
-
 /// Appends a stretch of a phase, or lengthens the last one if it is the same.
 pub fn extend_phases(phases: &mut Vec<PhaseSpan>, phase: Phase, start_s: f64, end_s: f64) {
-    let name = phase_name(phase);
+    let name = phase.name();
     match phases.last_mut() {
         Some(last) if last.phase == name => last.end_s = end_s,
         _ => phases.push(PhaseSpan {

@@ -4,7 +4,7 @@
 //! segment does (decisions change at planes between cells and at the ends of bands, and boxes are convex). Where they
 //! differ, the segment is halved, down to a length at which both answers are followed for all of it.
 
-use firmware::phase::{Phase, PhaseState, Step};
+use firmware::phase::{Decision, Phase, PhaseState};
 use firmware::table::{LAWS, Law, TableView};
 use firmware::units::State;
 
@@ -117,10 +117,10 @@ fn advance(
 }
 
 /// Power of an answer \[GW\]; outside the table none (the exploration ends there with an error).
-fn power(spec: &Spec, step: Step) -> f64 {
+fn power(spec: &Spec, step: Decision) -> f64 {
     match step {
-        Step::Level(level) => spec.fleet_power_gw() * spec.input.value(level.into()),
-        Step::Outside => 0.0,
+        Decision::Level(level) => spec.fleet_power_gw() * spec.input.value(level.into()),
+        Decision::Outside => 0.0,
     }
 }
 
