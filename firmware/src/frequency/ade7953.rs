@@ -6,12 +6,21 @@
 //! | PERIOD | 0x10E | 16 | `f = 223750 Hz / (PERIOD + 1)` |
 //! | unlock | 0x0FE | 8 | 0xAD before the next one may be written |
 //! | required setting | 0x120 | 16 | 0x0030: the data sheet's figures hold only with it |
+//! | last data | 0x1FF | 16 | what the chip sent or took in the last transfer of 16 bits |
 //!
 //! ## Bytes on the bus
 //! Addresses and data are most significant byte first. Over SPI (mode 3, one chip select for the
 //! whole frame) a frame is address (2), 0x80 for a read or 0x00 for a write (1), data. Over I2C the
 //! device is 0x38: a read writes the address and reads the data after a repeated start, a write
 //! carries address and data.
+//!
+//! After every reading of PERIOD the last data are read too. They are what the chip sent; if they
+//! differ from what arrived, a bit was lost on the bus, and there is no reading.
+//!
+//! ## Steps of the phase
+//! PERIOD is one period of the mains. When the phase steps by 2 degrees, one of them is wrong by
+//! 0.28 Hz. So the chip is read once a period between the ticks, and the reading is the median of
+//! the last five: a step is in one of them. It lags by two periods more.
 //!
 //! ## Tradeoffs
 //! One step of PERIOD is 11.2 mHz at 50 Hz: enough for the droop, coarse for a table whose spec
@@ -34,6 +43,8 @@ pub const PERIOD: u16 = 0x10E;
 pub const UNLOCK: u16 = 0x0FE;
 /// Address of the setting that the data sheet requires after power-up.
 pub const REQUIRED: u16 = 0x120;
+/// Address of what was transferred last, 16 bits.
+pub const LAST_DATA: u16 = 0x1FF;
 /// What unlocks.
 pub const UNLOCK_VALUE: u8 = 0xAD;
 /// What is required.
@@ -47,6 +58,11 @@ const NOMINAL_COUNTS: u32 = PERIOD_CLOCK_HZ / NOMINAL_HZ;
 /// Readings in a row that may be equal \[ticks\]. On 9 August 2019 PERIOD would have stood still
 /// for 18 s at most.
 const STUCK_TICKS: u16 = 600;
+
+/// Periods whose median is the reading.
+const SAMPLES: usize = 5;
+/// Time between two samples: a nominal period \[ms\].
+const SAMPLE_MS: u32 = 1000 / NOMINAL_HZ;
 
 const _: () = assert!(NOMINAL_COUNTS == 4475);
 
@@ -167,6 +183,8 @@ pub fn on<H: Hardware>(hardware: &mut H) -> Option<Ade7953<Spi<H::Spi>>> {
 pub struct Ade7953<R> {
     registers: R,
     configured: bool,
+    /// Deviations \[µHz\] with their moment \[ms\], the oldest first.
+    samples: heapless::Deque<(i32, u32), SAMPLES>,
 }
 
 impl<R: Registers> Ade7953<R> {
@@ -175,6 +193,7 @@ impl<R: Registers> Ade7953<R> {
         Self {
             registers,
             configured: false,
+            samples: heapless::Deque::new(),
         }
     }
 
@@ -198,10 +217,58 @@ impl<R: Registers> Ade7953<R> {
             self.configure()?;
             self.configured = true;
         }
-        let period = self.registers.read_u16(PERIOD);
+        let period = self.verified();
         // A chip that stopped answering may have lost its supply, and its setting with it.
         self.configured = period.is_ok();
         period
+    }
+
+    /// PERIOD, as the chip confirms that it was sent.
+    fn verified(&mut self) -> Result<u16, BusError> {
+        let period = self.registers.read_u16(PERIOD)?;
+        if self.registers.read_u16(LAST_DATA)? == period {
+            Ok(period)
+        } else {
+            Err(BusError)
+        }
+    }
+
+    /// Takes a sample.
+    fn sample(&mut self, now_ms: u32) -> Result<(), FrequencyError> {
+        let period = self.period().map_err(|BusError| FrequencyError::Bus)?;
+        let deviation = deviation_uhz(period);
+        // A chip that was reset has no period yet, and has lost its setting.
+        self.configured = deviation.is_ok();
+        let deviation = deviation?;
+        if self.samples.is_full() {
+            let _oldest = self.samples.pop_front();
+        }
+        // There is room now.
+        let _ = self.samples.push_back((deviation, now_ms));
+        Ok(())
+    }
+
+    /// The age of the newest sample \[ms\]; none before the first.
+    fn age_ms(&self, now_ms: u32) -> Option<u32> {
+        let (_, at_ms) = self.samples.back()?;
+        Some(now_ms.wrapping_sub(*at_ms))
+    }
+
+    /// The median of the samples of the last five periods \[µHz\]; the newest, if they are too few.
+    fn median(&self, now_ms: u32) -> Option<i32> {
+        let fresh = |at_ms: u32| now_ms.wrapping_sub(at_ms) < SAMPLES as u32 * SAMPLE_MS;
+        let mut sorted = heapless::Vec::<i32, SAMPLES>::new();
+        for (deviation, at_ms) in &self.samples {
+            if fresh(*at_ms) {
+                // As many as there are samples fit.
+                let _ = sorted.push(*deviation);
+            }
+        }
+        if sorted.len() < 3 {
+            return sorted.last().copied();
+        }
+        sorted.sort_unstable();
+        sorted.get(sorted.len() / 2).copied()
     }
 }
 
@@ -212,106 +279,34 @@ impl<R: Registers> FrequencySource for Ade7953<R> {
     }
 
     fn lag_ms(&self) -> u16 {
-        // PERIOD is the last whole mains period.
-        10
+        // PERIOD is the last whole mains period: half of it. The median of a ramp is its middle.
+        (SAMPLE_MS / 2 + SAMPLE_MS * (SAMPLES as u32 / 2)) as u16
     }
 
     fn stuck_after(&self) -> Option<NonZeroU16> {
         NonZeroU16::new(STUCK_TICKS)
     }
 
-    fn read(&mut self, _now_ms: u32) -> Result<Reading, FrequencyError> {
-        let period = self.period().map_err(|BusError| FrequencyError::Bus)?;
+    fn poll(&mut self, now_ms: u32) {
+        if self.age_ms(now_ms).is_none_or(|age| age >= SAMPLE_MS) && self.sample(now_ms).is_err() {
+            // The tick that reads next says what is wrong.
+            self.samples.clear();
+        }
+    }
+
+    fn read(&mut self, now_ms: u32) -> Result<Reading, FrequencyError> {
+        if self.age_ms(now_ms).is_none_or(|age| age >= SAMPLE_MS)
+            && let Err(error) = self.sample(now_ms)
+        {
+            self.samples.clear();
+            return Err(error);
+        }
         Ok(Reading {
-            deviation_uhz: deviation_uhz(period)?,
+            deviation_uhz: self.median(now_ms).ok_or(FrequencyError::NoSignal)?,
             age_ms: 0,
         })
     }
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use embedded_hal_mock::eh1::i2c::{Mock as I2cMock, Transaction as I2cTransaction};
-    use embedded_hal_mock::eh1::spi::{Mock as SpiMock, Transaction as SpiTransaction};
-    use std::vec;
-
-    #[test]
-    fn spi_carries_these_bytes() {
-        let mut mock = SpiMock::new(&[
-            SpiTransaction::transaction_start(),
-            SpiTransaction::write_vec(vec![0x00, 0xFE, 0x00, 0xAD]),
-            SpiTransaction::transaction_end(),
-            SpiTransaction::transaction_start(),
-            SpiTransaction::write_vec(vec![0x01, 0x20, 0x00, 0x00, 0x30]),
-            SpiTransaction::transaction_end(),
-            SpiTransaction::transaction_start(),
-            SpiTransaction::write_vec(vec![0x01, 0x20, 0x80]),
-            SpiTransaction::read_vec(vec![0x00, 0x30]),
-            SpiTransaction::transaction_end(),
-            SpiTransaction::transaction_start(),
-            SpiTransaction::write_vec(vec![0x01, 0x0E, 0x80]),
-            SpiTransaction::read_vec(vec![0x11, 0x7A]),
-            SpiTransaction::transaction_end(),
-            SpiTransaction::transaction_start(),
-            SpiTransaction::write_vec(vec![0x01, 0x0E, 0x80]),
-            SpiTransaction::read_vec(vec![0xFF, 0xFF]),
-            SpiTransaction::transaction_end(),
-        ]);
-        let mut chip = Ade7953::new(Spi(mock.clone()));
-        let nominal = Reading {
-            deviation_uhz: 0,
-            age_ms: 0,
-        };
-        assert_eq!(chip.read(0), Ok(nominal));
-        assert_eq!(chip.read(100), Err(FrequencyError::NoSignal));
-        mock.done();
-    }
-
-    #[test]
-    fn i2c_carries_these_bytes_and_configures_again_after_a_failure() {
-        use embedded_hal::i2c::{ErrorKind, NoAcknowledgeSource};
-        let configure = [
-            I2cTransaction::write(0x38, vec![0x00, 0xFE, 0xAD]),
-            I2cTransaction::write(0x38, vec![0x01, 0x20, 0x00, 0x30]),
-            I2cTransaction::write_read(0x38, vec![0x01, 0x20], vec![0x00, 0x30]),
-        ];
-        let failed = I2cTransaction::write_read(0x38, vec![0x01, 0x0E], vec![0, 0])
-            .with_error(ErrorKind::NoAcknowledge(NoAcknowledgeSource::Address));
-        let read = I2cTransaction::write_read(0x38, vec![0x01, 0x0E], vec![0x11, 0x7B]);
-        let mut all = configure.to_vec();
-        all.push(failed);
-        all.extend(configure);
-        all.push(read);
-        let mut mock = I2cMock::new(&all);
-        let mut chip = Ade7953::new(TwoWire(mock.clone()));
-        assert_eq!(chip.read(0), Err(FrequencyError::Bus));
-        // 223750/4476 - 50 = -11.1706 mHz.
-        assert_eq!(chip.read(100).map(|r| r.deviation_uhz), Ok(-11_171));
-        mock.done();
-    }
-
-    #[test]
-    fn a_chip_that_does_not_keep_its_setting_is_a_bus_error() {
-        let mut mock = I2cMock::new(&[
-            I2cTransaction::write(0x38, vec![0x00, 0xFE, 0xAD]),
-            I2cTransaction::write(0x38, vec![0x01, 0x20, 0x00, 0x30]),
-            I2cTransaction::write_read(0x38, vec![0x01, 0x20], vec![0xFF, 0xFF]),
-        ]);
-        let mut chip = Ade7953::new(TwoWire(mock.clone()));
-        assert_eq!(chip.read(0), Err(FrequencyError::Bus));
-        mock.done();
-    }
-
-    #[test]
-    fn every_register_value_decodes_within_one_count() {
-        for period in 1..u16::MAX {
-            let deviation = deviation_uhz(period).expect("only the ends have no signal");
-            let exact = 223_750.0 / (f64::from(period) + 1.0) - 50.0;
-            let exact = (exact * 1e6).min(f64::from(i32::MAX));
-            // Rounded down to a µHz; f64 is exact to 1e-16 of 1e11.
-            let below = exact - f64::from(deviation);
-            assert!((-1e-3..1.0 + 1e-3).contains(&below), "{period}: {below}");
-        }
-    }
-}
+mod tests;

@@ -18,8 +18,27 @@ pub use zero_crossing as meter;
 
 use core::num::NonZeroU16;
 
-/// Nominal frequency \[Hz\].
-pub const NOMINAL_HZ: u32 = 50;
+/// Nominal frequency of the grids that the shipped specs describe \[Hz\].
+pub const NOMINAL_HZ: u32 = Nominal::Hz50.hz();
+
+/// Nominal frequency of a mains.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Nominal {
+    /// Europe, most of Asia, Africa and Australia.
+    Hz50,
+    /// North America, Korea, parts of Japan.
+    Hz60,
+}
+
+impl Nominal {
+    /// The frequency \[Hz\].
+    pub const fn hz(self) -> u32 {
+        match self {
+            Self::Hz50 => 50,
+            Self::Hz60 => 60,
+        }
+    }
+}
 
 /// One measurement.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
