@@ -38,7 +38,8 @@ fn main() -> io::Result<()> {
         RISCV_MAP.to_owned()
     });
     println!("cargo::rerun-if-changed={}", map.display());
-    // The linker looks into the folder it is started in first, so no map may lie there by this name.
+    // The linker looks into the folder it is started in first, so no map may lie there by this
+    // name.
     fs::copy(&map, out.join(MAP))?;
     println!("cargo::rustc-link-search={}", out.display());
     if arm {

@@ -11,9 +11,10 @@ use panic_halt as _;
 
 use cortex_m_rt::entry;
 use firmware::board::{Parts, Runner};
-use firmware::charger::ChargerConfig;
+use firmware::charger::{ChargerConfig, StartDelay};
 use firmware::flash;
 use firmware::frequency::meter;
+use firmware::response::LevelOffset;
 
 #[path = "boards/stm32f405.rs"]
 mod board;
@@ -50,5 +51,10 @@ fn charge() -> Option<()> {
         cause: started.cause,
     };
     let table = flash::image(table_region::bytes());
-    Runner::new(parts, table, ChargerConfig::DEFAULT).run()
+    let config = ChargerConfig {
+        level_offset: LevelOffset::of_serial(started.serial),
+        start_delay: StartDelay::street(started.serial),
+        ..ChargerConfig::DEFAULT
+    };
+    Runner::new(parts, table, config).run()
 }

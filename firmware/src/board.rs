@@ -10,6 +10,7 @@ use embedded_hal::spi::SpiDevice;
 
 use crate::charger::{Charger, ChargerConfig, Watchdog};
 use crate::dispatch::Dispatch;
+use crate::dispatch::car::CarSense;
 use crate::fault::ResetCause;
 use crate::frequency::FrequencySource;
 use crate::frequency::zero_crossing::Captures;
@@ -48,6 +49,8 @@ pub trait Hardware {
     type Pwm: SetDutyCycle;
     /// The contactor's coil, open when taken.
     type Coil: OutputPin;
+    /// What measures the pilot.
+    type Car: CarSense;
 
     /// The bus in mode 3, at 1 MHz or less.
     fn spi(&mut self) -> Option<Self::Spi>;
@@ -60,6 +63,9 @@ pub trait Hardware {
 
     /// The coil.
     fn coil(&mut self) -> Option<Self::Coil>;
+
+    /// What measures the pilot.
+    fn car(&mut self) -> Option<Self::Car>;
 }
 
 /// What a charger is made of, on a board that has started.
@@ -227,6 +233,10 @@ mod tests {
 
     impl Dispatch for Nothing {
         fn apply(&mut self, _: Participation, _: u32) -> Result<SetPoint, DispatchError> {
+            Ok(SetPoint::Paused)
+        }
+
+        fn rest(&mut self, _: u32) -> Result<SetPoint, DispatchError> {
             Ok(SetPoint::Paused)
         }
     }

@@ -11,6 +11,10 @@
 //! the clock, or one backwards, makes the observer start again. A tick that comes too early
 //! advances nothing.
 //!
+//! ## Energy
+//! Nothing is energised before a frequency has been believed and the delay of [`StartDelay`] has
+//! passed, nor after the mains has gone, until the same has happened again.
+//!
 //! ## Trust
 //! After a start nobody knows the governor chain: the grid may be in the middle of an event. The
 //! observer's initial error dies out with its slowest time constant. So the droop, which needs f
@@ -20,19 +24,21 @@
 mod clock;
 mod config;
 mod report;
+mod start;
 
 pub use clock::CATCH_UP_TICKS_MAX;
 pub use config::{ChargerConfig, trust_ticks};
 pub use report::Report;
+pub use start::StartDelay;
 
 use crate::control_loop::{ControlLoop, Source};
 use crate::dispatch::Dispatch;
 use crate::droop::Droop;
 use crate::event::{Course, EventWatch};
 use crate::fault::{Faults, Mode, ResetCause};
-use crate::frequency::FrequencySource;
 use crate::frequency::filter::Filter;
 use crate::frequency::gate::Gate;
+use crate::frequency::{FrequencyError, FrequencySource};
 use crate::observer::{Observer, ObserverConfig};
 use crate::phase::Phase;
 use crate::table::{TableError, TableView, field};
@@ -40,6 +46,7 @@ use crate::units::{Participation, State};
 use crate::wide::divide;
 use clock::{Due, TickClock};
 use report::{ChangeLog, Standing};
+use start::Start;
 
 /// Tick without a table \[ms\].
 pub const TICK_MS_DEFAULT: u16 = 100;
@@ -74,6 +81,7 @@ pub struct Charger<'t, S, D, W> {
     warm_up_left: u16,
     lost_ticks: u16,
     clock: TickClock,
+    start: Start,
     /// Ticks since the start; saturates.
     sequence: u32,
     f_uhz: i32,
@@ -161,6 +169,7 @@ impl<'t, S: FrequencySource, D: Dispatch, W: Watchdog> Charger<'t, S, D, W> {
             warm_up_left: warm_up_ticks,
             lost_ticks: 0,
             clock: TickClock::new(tick_ms),
+            start: Start::new(config.start_delay),
             sequence: 0,
             f_uhz: 0,
             standing: Standing::FIRST,
@@ -204,10 +213,16 @@ impl<'t, S: FrequencySource, D: Dispatch, W: Watchdog> Charger<'t, S, D, W> {
         let due = self.ticks_due(now_ms, &mut faults);
         let reading = self.source.read(now_ms);
         match self.gate.admit(reading) {
-            Ok(f_uhz) => self.follow(f_uhz, due, &mut faults),
+            Ok(f_uhz) => {
+                self.start.seen(f_uhz, now_ms);
+                self.follow(f_uhz, due, &mut faults);
+            }
             Err(error) => {
                 faults.insert(error.into());
                 self.without_frequency(due);
+                if error == FrequencyError::NoSignal && self.standing.mode == Mode::Safe {
+                    self.start.dark();
+                }
             }
         }
         self.sequence = self.sequence.saturating_add(1);
@@ -225,7 +240,11 @@ impl<'t, S: FrequencySource, D: Dispatch, W: Watchdog> Charger<'t, S, D, W> {
         } else {
             self.restarted = false;
         }
-        let applied = self.dispatch.apply(self.standing.participation, now_ms);
+        let applied = if self.start.ready(now_ms) {
+            self.dispatch.apply(self.standing.participation, now_ms)
+        } else {
+            self.dispatch.rest(now_ms)
+        };
         match applied {
             Ok(_) => self.watchdog.feed(),
             Err(_) => faults.insert(Faults::DISPATCH),

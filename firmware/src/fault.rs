@@ -102,8 +102,8 @@ impl From<FrequencyError> for Faults {
 /// | `Safe` | frequency lost for longer | released step by step | frequency back |
 /// | `Release` | the end of an event | released while f is recovered | at zero; f below I1 |
 ///
-/// Released step by step means: back to ordinary charging. [`crate::event`] says when an event
-/// ends.
+/// Released step by step means: back to ordinary charging. In `Safe` without any signal the mains
+/// is taken for gone, and nothing is energised. [`crate::event`] says when an event ends.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[repr(u8)]

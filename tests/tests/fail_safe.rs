@@ -1,4 +1,5 @@
-//! Every way in which a part of the charger can be missing: the state it enters, what telemetry says, how it leaves.
+//! Every way in which a part of the charger can be missing: the state it enters, what telemetry
+//! says, how it leaves.
 #![allow(
     clippy::unwrap_used,
     clippy::panic,
@@ -349,6 +350,10 @@ impl Dispatch for Flaky {
         } else {
             Ok(SetPoint::Paused)
         }
+    }
+
+    fn rest(&mut self, now_ms: u32) -> Result<SetPoint, DispatchError> {
+        self.apply(Participation::NONE, now_ms)
     }
 }
 

@@ -8,6 +8,7 @@
 //! | PA8 | control pilot, 1 kHz (TIM1 channel 1) | unless `bidirectional` |
 //! | PB0 | contactor, high closes | unless `bidirectional` |
 //! | PA8 | signed power set-point, 1 kHz (TIM1 channel 1) | `bidirectional` |
+//! | PA1 | the pilot's voltage: 1.65 V for 0 V, 3.15 V for 12 V (ADC1) | unless `bidirectional` |
 //! | PA2 | telemetry, 115 200 baud 8N1 (USART2) | always |
 //!
 //! The timer captures a crossing in hardware. The watchdog bites after four ticks without a
@@ -17,11 +18,14 @@ use embedded_hal::spi::{ErrorType, MODE_3, Operation, SpiDevice};
 use embedded_hal_nb::serial::Write as _;
 use firmware::board::{Board, Hardware, Rest};
 use firmware::charger::Watchdog;
+use firmware::dispatch::car::{CarSense, CarState};
 use firmware::dispatch::pilot::PILOT_HZ;
 use firmware::fault::ResetCause;
 use firmware::frequency::zero_crossing::Captures;
-use stm32f4xx_hal::gpio::{Output, PA0, PA4, PA5, PA6, PA7, PA8, PB0};
-use stm32f4xx_hal::pac::{self, SPI1, TIM1, TIM2, TIM5, USART2};
+use stm32f4xx_hal::adc::Adc;
+use stm32f4xx_hal::adc::config::{AdcConfig, SampleTime};
+use stm32f4xx_hal::gpio::{Analog, Output, PA0, PA1, PA4, PA5, PA6, PA7, PA8, PB0};
+use stm32f4xx_hal::pac::{self, ADC1, SPI1, TIM1, TIM2, TIM5, USART2};
 use stm32f4xx_hal::prelude::*;
 use stm32f4xx_hal::rcc::{Config, Rcc};
 use stm32f4xx_hal::serial::config::Config as SerialConfig;
@@ -29,7 +33,7 @@ use stm32f4xx_hal::serial::{Serial, Tx};
 use stm32f4xx_hal::signature::Uid;
 use stm32f4xx_hal::spi;
 use stm32f4xx_hal::timer::capture::{CaptureChannel, CaptureHzManager};
-use stm32f4xx_hal::timer::{CapturePolarity, CounterUs, Flag, PwmChannel, Timer};
+use stm32f4xx_hal::timer::{CaptureFilter, CapturePolarity, CounterUs, Flag, PwmChannel, Timer};
 use stm32f4xx_hal::watchdog::IndependentWatchdog;
 
 /// Crystal of the board \[MHz\].
@@ -38,8 +42,18 @@ const CRYSTAL_MHZ: u32 = 25;
 const CRYSTAL_PPM: u16 = 20;
 /// Core and timer clock \[MHz\].
 const CORE_MHZ: u32 = 84;
-/// Timer of the captures \[Hz\]; divides the timer clock.
-const CAPTURE_HZ: u32 = 1_000_000;
+/// Timer of the captures \[Hz\]: the whole timer clock, so that its tick is worth 6 µHz.
+const CAPTURE_HZ: u32 = CORE_MHZ * 1_000_000;
+/// What the comparator in front of PA0 must keep to, noise of the mains included \[ns\].
+const CROSSING_JITTER_NS: u32 = 500;
+/// Turns for which the crystal is waited for.
+const CRYSTAL_TURNS: u32 = 400_000;
+/// Conversions of the pilot: 68 cycles of 21 MHz each, so 1.04 ms, more than a period.
+const PILOT_SAMPLES: u32 = 320;
+/// Voltage on PA1 for 0 V on the pilot \[mV\].
+const PILOT_ZERO_MV: i32 = 1_650;
+/// Volts on the pilot for one on PA1.
+const PILOT_GAIN: i32 = 8;
 /// Longest time without a completed tick \[ms\].
 const WATCHDOG_MS: u32 = 400;
 /// Telemetry \[baud\].
@@ -48,8 +62,6 @@ const BAUD: u32 = 115_200;
 const SPI_KHZ: u32 = 1_000;
 /// Time waited from chip select to the first edge, and from the last edge to release \[µs\].
 const SETTLE_US: u32 = 2;
-
-const _: () = assert!((CORE_MHZ * 1_000_000).is_multiple_of(CAPTURE_HZ));
 
 /// The board, started.
 pub(crate) struct Started {
@@ -65,21 +77,37 @@ pub(crate) struct Started {
     pub(crate) serial: u32,
 }
 
-/// Starts clocks, time, telemetry and watchdog; `None` if one of them does not start, or a second
-/// time.
+/// Starts the crystal; whether it runs. Waited for is many times what a crystal takes (2 ms).
+fn crystal_runs(rcc: &pac::RCC) -> bool {
+    rcc.cr().modify(|_, w| w.hseon().on());
+    // A turn takes some cycles of the 16 MHz of the internal oscillator: 100 ms or more.
+    (0..CRYSTAL_TURNS).any(|_| rcc.cr().read().hserdy().is_ready())
+}
+
+/// Starts watchdog, clocks, time and telemetry. `None` if one of them does not start, or a second
+/// time: then nothing is set up, every pin floats, and the watchdog restarts the board.
 pub(crate) fn start() -> Option<Started> {
     let peripherals = pac::Peripherals::take()?;
+    // Before the clock: a crystal that does not start must not hang the charger for ever.
+    let mut watchdog = IndependentWatchdog::new(peripherals.IWDG);
+    watchdog.start(WATCHDOG_MS.millis());
     let cause = reset_cause(&peripherals.RCC);
+    if !crystal_runs(&peripherals.RCC) {
+        return None;
+    }
+    // One configuration, known when this is compiled: with two, the clock tree is worked out at run
+    // time, in 2 KB of code that can panic.
     let clocks = Config::hse(CRYSTAL_MHZ.MHz()).sysclk(CORE_MHZ.MHz());
     let mut rcc = peripherals.RCC.freeze(clocks);
+    // If the crystal dies later, the core gets an interrupt that cannot be masked. Its handler
+    // loops, and the watchdog restarts the board.
+    rcc.cr().modify(|_, w| w.csson().on());
     let port_a = peripherals.GPIOA.split(&mut rcc);
     let port_b = peripherals.GPIOB.split(&mut rcc);
     let baud = SerialConfig::default().baudrate(BAUD.bps());
     let line = Serial::tx(peripherals.USART2, port_a.pa2, baud, &mut rcc).ok()?;
     let mut timer = peripherals.TIM2.counter_us(&mut rcc);
     timer.start(u32::MAX.micros()).ok()?;
-    let mut watchdog = IndependentWatchdog::new(peripherals.IWDG);
-    watchdog.start(WATCHDOG_MS.millis());
     let spi = (
         peripherals.SPI1,
         port_a.pa4,
@@ -94,6 +122,7 @@ pub(crate) fn start() -> Option<Started> {
             capture: Some((peripherals.TIM5, port_a.pa0)),
             pwm: Some((peripherals.TIM1, port_a.pa8)),
             coil: Some(port_b.pb0),
+            car: Some((peripherals.ADC1, port_a.pa1)),
         },
         board: Lines { timer, line },
         watchdog: Dog(watchdog),
@@ -156,6 +185,7 @@ pub(crate) struct Pins {
     capture: Option<(TIM5, PA0)>,
     pwm: Option<(TIM1, PA8)>,
     coil: Option<PB0>,
+    car: Option<(ADC1, PA1)>,
 }
 
 impl Hardware for Pins {
@@ -163,6 +193,7 @@ impl Hardware for Pins {
     type Captures = Crossings;
     type Pwm = PwmChannel<TIM1, 0>;
     type Coil = PB0<Output>;
+    type Car = Pilot;
 
     fn spi(&mut self) -> Option<Chip> {
         let (bus, select, clock, data_in, data_out) = self.spi.take()?;
@@ -179,6 +210,9 @@ impl Hardware for Pins {
         let (timer, (channel, ..)) = timer.capture_hz(CAPTURE_HZ.Hz());
         let mut channel = channel.with(pin);
         channel.set_polarity(CapturePolarity::ActiveHigh);
+        // Eight samples alike at 21 MHz: spikes of up to 0.33 µs pass by, and an edge moves by 48
+        // ns.
+        channel.set_filter(CaptureFilter::FdtsDiv4N8);
         channel.enable();
         Some(Crossings { timer, channel })
     }
@@ -198,7 +232,34 @@ impl Hardware for Pins {
     fn coil(&mut self) -> Option<PB0<Output>> {
         Some(self.coil.take()?.into_push_pull_output())
     }
+
+    fn car(&mut self) -> Option<Pilot> {
+        let (adc, pin) = self.car.take()?;
+        let adc = Adc::new(adc, true, AdcConfig::default(), &mut self.rcc);
+        let pin = pin.into_analog();
+        Some(Pilot { adc, pin })
+    }
 }
+
+/// The pilot's voltage on PA1.
+pub(crate) struct Pilot {
+    adc: Adc<ADC1>,
+    pin: PA1<Analog>,
+}
+
+impl CarSense for Pilot {
+    fn state(&mut self) -> Option<CarState> {
+        // The highest of a whole period of the pilot is its upper level.
+        let highest = (0..PILOT_SAMPLES)
+            .map(|_| self.adc.convert(&self.pin, SampleTime::Cycles_56))
+            .max()?;
+        let pin_mv = i32::from(self.adc.sample_to_millivolts(highest));
+        Some(CarState::of_level((pin_mv - PILOT_ZERO_MV) * PILOT_GAIN))
+    }
+}
+
+/// Flag of TIM5's status register: a capture of channel 1 was overwritten.
+const CC1OF: u32 = 1 << 9;
 
 /// Rising edges on PA0, captured by TIM5 in hardware.
 pub(crate) struct Crossings {
@@ -209,6 +270,18 @@ pub(crate) struct Crossings {
 impl Captures for Crossings {
     const TIMER_HZ: u32 = CAPTURE_HZ;
     const CLOCK_PPM: u16 = CRYSTAL_PPM;
+    const JITTER_NS: u32 = CROSSING_JITTER_NS;
+
+    fn lost(&mut self) -> bool {
+        // SAFETY: reads a status register, and clears one flag by writing 0 to it and 1, which
+        // changes nothing, to all others. Nothing else writes this register while the loop runs.
+        let status = unsafe { (*TIM5::ptr()).sr() };
+        let lost = status.read().cc1of().bit();
+        if lost {
+            status.write(|w| unsafe { w.bits(!CC1OF) });
+        }
+        lost
+    }
 
     fn take(&mut self) -> Option<u32> {
         // Reading the capture register clears its flag.

@@ -1,4 +1,4 @@
-//! A unidirectional charger: control pilot and contactor.
+//! A unidirectional charger: control pilot, contactor and what the car says.
 
 use firmware::board::{Hardware, Rest};
 use firmware::dispatch::contactor::ContactorTimes;
@@ -12,11 +12,12 @@ const CABLE_MA: u32 = 32_000;
 /// The charger's output; `serial` is its place in the fleet.
 pub(crate) fn on<H: Hardware>(hardware: &mut H, serial: u32) -> Option<impl Dispatch + use<H>> {
     // A line that is high all the time: no charging until the first tick has decided.
-    Some(Unidirectional::new(
+    let charger = Unidirectional::new(
         hardware.pwm(Rest::High)?,
         hardware.coil()?,
         ContactorTimes::DEFAULT,
         Threshold::of_serial(serial),
         Limits::all(CABLE_MA),
-    ))
+    );
+    Some(charger.with_car(hardware.car()?))
 }

@@ -23,14 +23,15 @@ impl TickClock {
     /// A clock before its first tick.
     pub(super) fn new(tick_ms: u16) -> Self {
         Self {
-            tick_ms: u32::from(tick_ms).max(1),
+            tick_ms: u32::from(tick_ms),
             last_ms: None,
         }
     }
 
     /// The ticks that are due now.
     pub(super) fn due(&mut self, now_ms: u32) -> Due {
-        let tick = self.tick_ms;
+        // Not zero; said so that no panic is compiled in.
+        let tick = self.tick_ms.max(1);
         let Some(last_ms) = self.last_ms else {
             self.last_ms = Some(now_ms);
             return Due::Ticks(1);

@@ -1,5 +1,6 @@
 //! Settings of a charger, and the time until its observer is trusted.
 
+use super::start::StartDelay;
 use crate::event::EventEnd;
 use crate::frequency::gate::GateLimits;
 use crate::response::LevelOffset;
@@ -43,11 +44,13 @@ pub struct ChargerConfig {
     pub level_offset: LevelOffset,
     /// When an event is over, and how long the way back takes.
     pub event_end: EventEnd,
+    /// How long nothing is energised after a start, once the mains has been seen.
+    pub start_delay: StartDelay,
 }
 
 impl ChargerConfig {
     /// No filter, 1 s of hold at 100 ms a tick, release over 60 s, warm-up by the plant, levels as
-    /// they are, [`EventEnd::DEFAULT`].
+    /// they are, [`EventEnd::DEFAULT`], no delay at the start.
     pub const DEFAULT: Self = Self {
         gate: GateLimits::DEFAULT,
         filter_ticks: 1,
@@ -56,5 +59,6 @@ impl ChargerConfig {
         warm_up_ticks: None,
         level_offset: LevelOffset::NONE,
         event_end: EventEnd::DEFAULT,
+        start_delay: StartDelay::NONE,
     };
 }

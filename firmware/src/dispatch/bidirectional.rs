@@ -80,6 +80,13 @@ impl<S: PowerStage> Dispatch for Bidirectional<S> {
             .map_err(|_| DispatchError::Power)?;
         Ok(SetPoint::Power { w })
     }
+
+    fn rest(&mut self, _now_ms: u32) -> Result<SetPoint, DispatchError> {
+        self.stage
+            .set_power_w(0)
+            .map_err(|_| DispatchError::Power)?;
+        Ok(SetPoint::Power { w: 0 })
+    }
 }
 
 #[cfg(test)]
@@ -110,6 +117,11 @@ mod tests {
         charger.set_limits(LimitSource::User, 28_000, 0);
         let set = charger.apply(Participation::ALL, 0);
         assert_eq!(set, Ok(SetPoint::Power { w: 0 }));
+        assert_eq!(charger.stage.0, 0);
+        charger.set_limits(LimitSource::User, 28_000, 28_000);
+        assert!(charger.apply(Participation::ALL, 0).is_ok());
+        assert_eq!(charger.stage.0, -28_000);
+        assert_eq!(charger.rest(0), Ok(SetPoint::Power { w: 0 }));
         assert_eq!(charger.stage.0, 0);
     }
 

@@ -32,9 +32,13 @@ enum Contact {
     Pausing {
         since_ms: u32,
     },
+    /// Opened after a pause.
     Open {
         since_ms: u32,
     },
+    /// Open because no car asks for power: nothing was switched under load, and it may close at
+    /// once.
+    Idle,
 }
 
 /// A contactor on an output pin: high closes.
@@ -42,11 +46,12 @@ enum Contact {
 pub struct Contactor<O> {
     pin: O,
     times: ContactorTimes,
+    /// `None` while the position is unknown.
     contact: Option<Contact>,
 }
 
 impl<O: OutputPin> Contactor<O> {
-    /// A contactor in an unknown position; the first request sets it.
+    /// A contactor in an unknown position; the first call sets it.
     pub const fn new(pin: O, times: ContactorTimes) -> Self {
         Self {
             pin,
@@ -55,35 +60,55 @@ impl<O: OutputPin> Contactor<O> {
         }
     }
 
+    /// Whether a request to connect would be granted now.
+    pub const fn may_close(&self, now_ms: u32) -> bool {
+        match self.contact {
+            Some(Contact::Open { since_ms }) => {
+                now_ms.wrapping_sub(since_ms) >= self.times.off_min_ms
+            }
+            _ => true,
+        }
+    }
+
     /// Asks for the car to be connected or not; whether current may flow.
     ///
     /// # Errors
     /// That of the pin; the position then counts as unknown.
     pub fn request(&mut self, connect: bool, now_ms: u32) -> Result<bool, O::Error> {
-        let since = |since_ms: u32| now_ms.wrapping_sub(since_ms);
-        let next = match (self.contact, connect) {
-            (None | Some(Contact::Closed | Contact::Pausing { .. }), true) => Contact::Closed,
+        let next = match self.contact {
+            _ if connect && self.may_close(now_ms) => Contact::Closed,
             // The first request after a restart: the car may have been paused for any time, so open
             // at once.
-            (None, false) => Contact::Open { since_ms: now_ms },
-            (Some(Contact::Closed), false) => Contact::Pausing { since_ms: now_ms },
-            (Some(Contact::Pausing { since_ms }), false) => {
-                if since(since_ms) >= self.times.open_after_ms {
+            None => Contact::Open { since_ms: now_ms },
+            Some(Contact::Closed) => Contact::Pausing { since_ms: now_ms },
+            Some(Contact::Pausing { since_ms }) => {
+                if now_ms.wrapping_sub(since_ms) >= self.times.open_after_ms {
                     Contact::Open { since_ms: now_ms }
                 } else {
                     Contact::Pausing { since_ms }
                 }
             }
-            (Some(Contact::Open { since_ms }), true)
-                if since(since_ms) >= self.times.off_min_ms =>
-            {
-                Contact::Closed
-            }
-            (Some(Contact::Open { since_ms }), _) => Contact::Open { since_ms },
+            Some(open @ (Contact::Open { .. } | Contact::Idle)) => open,
         };
-        let open = matches!(next, Contact::Open { .. });
-        let was_open = matches!(self.contact, Some(Contact::Open { .. }));
-        if self.contact.is_none() || open != was_open {
+        self.set(next)
+    }
+
+    /// Opens at once, for the car does not ask for power. What was open stays as it is.
+    ///
+    /// # Errors
+    /// As [`Contactor::request`].
+    pub fn idle(&mut self) -> Result<(), O::Error> {
+        let next = match self.contact {
+            Some(open @ Contact::Open { .. }) => open,
+            _ => Contact::Idle,
+        };
+        self.set(next).map(|_closed| ())
+    }
+
+    fn set(&mut self, next: Contact) -> Result<bool, O::Error> {
+        let is_open = |contact| matches!(contact, Contact::Open { .. } | Contact::Idle);
+        let open = is_open(next);
+        if self.contact.is_none_or(|contact| is_open(contact) != open) {
             self.contact = None;
             if open {
                 self.pin.set_low()?;
@@ -124,6 +149,31 @@ mod tests {
         assert_eq!(at(16_000, false), Ok(false));
         assert_eq!(at(75_999, true), Ok(false));
         assert_eq!(at(76_000, true), Ok(true));
+        pin.done();
+    }
+
+    #[test]
+    fn a_car_that_does_not_ask_is_let_go_at_once_and_taken_back_at_once() {
+        let mut pin = Mock::new(&[
+            Transaction::set(State::Low),
+            Transaction::set(State::High),
+            Transaction::set(State::Low),
+            Transaction::set(State::High),
+            Transaction::set(State::Low),
+        ]);
+        let mut contactor = Contactor::new(pin.clone(), ContactorTimes::DEFAULT);
+        // The first call sets the pin, whatever it was.
+        assert_eq!(contactor.idle(), Ok(()));
+        assert_eq!(contactor.request(true, 100), Ok(true));
+        assert_eq!(contactor.idle(), Ok(()));
+        assert!(contactor.may_close(300));
+        assert_eq!(contactor.request(true, 300), Ok(true));
+        // A pause that has lasted keeps its time off, whatever the car does then.
+        assert_eq!(contactor.request(false, 1_000), Ok(false));
+        assert_eq!(contactor.request(false, 11_000), Ok(false));
+        assert_eq!(contactor.idle(), Ok(()));
+        assert!(!contactor.may_close(70_999));
+        assert!(contactor.may_close(71_000));
         pin.done();
     }
 }

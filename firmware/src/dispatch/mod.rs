@@ -6,6 +6,7 @@
 //! from other sources (user, site, cable) are applied last and always win.
 
 pub mod bidirectional;
+pub mod car;
 pub mod contactor;
 pub mod fleet;
 pub mod pilot;
@@ -96,4 +97,10 @@ pub trait Dispatch {
         participation: Participation,
         now_ms: u32,
     ) -> Result<SetPoint, DispatchError>;
+
+    /// Energises nothing: no current is offered, no contactor is closed, no power is set.
+    ///
+    /// # Errors
+    /// As [`Dispatch::apply`].
+    fn rest(&mut self, now_ms: u32) -> Result<SetPoint, DispatchError>;
 }

@@ -3,10 +3,14 @@
 //! Wanted is `I_limit (1 - u)`, with the lowest of all limits as the charger's own share. From 6 A
 //! up it is offered as it is; below, the charger draws 6 A or pauses by its [`Threshold`], so that
 //! the fleet's mean is what was wanted.
+//!
+//! The contactor closes when a current is offered and the car asks for power, and not otherwise. It
+//! opens at once when the car no longer asks, and when its state is a fault.
 
 use embedded_hal::digital::OutputPin;
 use embedded_hal::pwm::SetDutyCycle;
 
+use super::car::{AlwaysAsking, CarSense, CarState};
 use super::contactor::{Contactor, ContactorTimes};
 use super::fleet::Threshold;
 use super::pilot::{CURRENT_MAX_MA, CURRENT_MIN_MA, Pilot};
@@ -35,17 +39,18 @@ pub const fn current_ma(participation: Participation, limit_ma: u32, threshold: 
     }
 }
 
-/// A unidirectional charger: pilot and contactor.
+/// A unidirectional charger: pilot, contactor and what the car says.
 #[derive(Debug)]
-pub struct Unidirectional<P, O> {
+pub struct Unidirectional<P, O, C = AlwaysAsking> {
     pilot: Pilot<P>,
     contactor: Contactor<O>,
+    car: C,
     threshold: Threshold,
     limits_ma: Limits,
 }
 
 impl<P: SetDutyCycle, O: OutputPin> Unidirectional<P, O> {
-    /// A charger with limits \[mA\] and a place in the fleet.
+    /// A charger with limits \[mA\] and a place in the fleet, whose car always asks for power.
     pub const fn new(
         pwm: P,
         contactor: O,
@@ -56,39 +61,74 @@ impl<P: SetDutyCycle, O: OutputPin> Unidirectional<P, O> {
         Self {
             pilot: Pilot::new(pwm),
             contactor: Contactor::new(contactor, times),
+            car: AlwaysAsking,
             threshold,
             limits_ma,
         }
     }
 
+    /// The same charger, asking the car.
+    pub fn with_car<C: CarSense>(self, car: C) -> Unidirectional<P, O, C> {
+        Unidirectional {
+            pilot: self.pilot,
+            contactor: self.contactor,
+            car,
+            threshold: self.threshold,
+            limits_ma: self.limits_ma,
+        }
+    }
+}
+
+impl<P: SetDutyCycle, O: OutputPin, C: CarSense> Unidirectional<P, O, C> {
     /// Replaces one source's limit \[mA\]; in force from the next tick.
     pub fn set_limit(&mut self, source: LimitSource, limit_ma: u32) {
         self.limits_ma.set(source, limit_ma);
     }
+
+    /// No current: first the pilot, then the contactor, so that it opens without load.
+    fn pause(&mut self, connect: bool, now_ms: u32) -> Result<SetPoint, DispatchError> {
+        self.pilot.offer(0).map_err(|_| DispatchError::Pilot)?;
+        self.contactor
+            .request(connect, now_ms)
+            .map_err(|_| DispatchError::Contactor)?;
+        Ok(SetPoint::Paused)
+    }
 }
 
-impl<P: SetDutyCycle, O: OutputPin> Dispatch for Unidirectional<P, O> {
+impl<P: SetDutyCycle, O: OutputPin, C: CarSense> Dispatch for Unidirectional<P, O, C> {
     fn apply(
         &mut self,
         participation: Participation,
         now_ms: u32,
     ) -> Result<SetPoint, DispatchError> {
         let wanted = current_ma(participation, self.limits_ma.lowest(), self.threshold);
-        let pilot = |_| DispatchError::Pilot;
-        if wanted == 0 {
-            // First the pilot, then the contactor: it should open without load.
-            self.pilot.offer(0).map_err(pilot)?;
+        // Asked at every tick, for a measurement may need it.
+        let state = self.car.state();
+        let may_ask = matches!(state, Some(CarState::B | CarState::C));
+        if !may_ask {
+            return self.rest(now_ms);
         }
-        let connected = self
-            .contactor
-            .request(wanted > 0, now_ms)
-            .map_err(|_| DispatchError::Contactor)?;
-        if !connected || wanted == 0 {
-            self.pilot.offer(0).map_err(pilot)?;
-            return Ok(SetPoint::Paused);
+        if wanted == 0 || !self.contactor.may_close(now_ms) {
+            return self.pause(wanted > 0, now_ms);
         }
-        self.pilot.offer(wanted).map_err(pilot)?;
+        // First the pilot, then the contactor: it closes when a current is offered and the car
+        // asks.
+        self.pilot.offer(wanted).map_err(|_| DispatchError::Pilot)?;
+        let contact = if state == Some(CarState::C) {
+            self.contactor.request(true, now_ms).map(|_closed| ())
+        } else {
+            self.contactor.idle()
+        };
+        contact.map_err(|_| DispatchError::Contactor)?;
         Ok(SetPoint::Current { ma: wanted })
+    }
+
+    fn rest(&mut self, _now_ms: u32) -> Result<SetPoint, DispatchError> {
+        self.pilot.offer(0).map_err(|_| DispatchError::Pilot)?;
+        self.contactor
+            .idle()
+            .map_err(|_| DispatchError::Contactor)?;
+        Ok(SetPoint::Paused)
     }
 }
 
@@ -137,7 +177,7 @@ mod tests {
                 PwmTransaction::set_duty_cycle(counts),
             ]
         };
-        let calls: std::vec::Vec<_> = [duty(533), duty(266), duty(1000), duty(1000)]
+        let calls: std::vec::Vec<_> = [duty(533), duty(266), duty(1000)]
             .into_iter()
             .flatten()
             .collect();
@@ -157,5 +197,121 @@ mod tests {
         assert_eq!(charger.apply(Participation::ALL, 200), Ok(SetPoint::Paused));
         pwm.done();
         pin.done();
+    }
+
+    /// What happened on the two outputs, in order.
+    #[derive(Debug, Clone, PartialEq, Eq)]
+    enum Seen {
+        Offered(u32),
+        Closed(bool),
+    }
+
+    type Log = std::rc::Rc<core::cell::RefCell<std::vec::Vec<Seen>>>;
+
+    struct LoggedPilot(Log);
+
+    impl embedded_hal::pwm::ErrorType for LoggedPilot {
+        type Error = core::convert::Infallible;
+    }
+
+    impl SetDutyCycle for LoggedPilot {
+        fn max_duty_cycle(&self) -> u16 {
+            10_000
+        }
+
+        fn set_duty_cycle(&mut self, duty: u16) -> Result<(), Self::Error> {
+            let ma = super::super::pilot::current_ma(u32::from(duty) * 100);
+            self.0.borrow_mut().push(Seen::Offered(ma));
+            Ok(())
+        }
+    }
+
+    struct LoggedCoil(Log);
+
+    impl embedded_hal::digital::ErrorType for LoggedCoil {
+        type Error = core::convert::Infallible;
+    }
+
+    impl OutputPin for LoggedCoil {
+        fn set_low(&mut self) -> Result<(), Self::Error> {
+            self.0.borrow_mut().push(Seen::Closed(false));
+            Ok(())
+        }
+
+        fn set_high(&mut self) -> Result<(), Self::Error> {
+            self.0.borrow_mut().push(Seen::Closed(true));
+            Ok(())
+        }
+    }
+
+    struct Car(std::rc::Rc<core::cell::Cell<Option<CarState>>>);
+
+    impl CarSense for Car {
+        fn state(&mut self) -> Option<CarState> {
+            self.0.get()
+        }
+    }
+
+    #[test]
+    fn the_contactor_closes_after_the_offer_and_only_for_a_car_that_asks() {
+        let log = Log::default();
+        let state = std::rc::Rc::new(core::cell::Cell::new(Some(CarState::A)));
+        let mut charger = Unidirectional::new(
+            LoggedPilot(log.clone()),
+            LoggedCoil(log.clone()),
+            ContactorTimes::DEFAULT,
+            Threshold::from_ppm(0),
+            Limits::all(30_000),
+        )
+        .with_car(Car(state.clone()));
+        let mut tick = |car, now_ms| {
+            state.set(car);
+            let set = charger.apply(Participation::NONE, now_ms);
+            (set.unwrap(), log.take())
+        };
+        let paused = SetPoint::Paused;
+        let offered = SetPoint::Current { ma: 30_000 };
+        use Seen::{Closed, Offered};
+        let open = std::vec![Offered(0), Closed(false)];
+        assert_eq!(tick(Some(CarState::A), 0), (paused, open));
+        assert_eq!(
+            tick(Some(CarState::B), 100),
+            (offered, std::vec![Offered(30_000)])
+        );
+        let closes = std::vec![Offered(30_000), Closed(true)];
+        assert_eq!(tick(Some(CarState::C), 200), (offered, closes.clone()));
+        assert_eq!(
+            tick(Some(CarState::C), 300),
+            (offered, std::vec![Offered(30_000)])
+        );
+        let opens = std::vec![Offered(30_000), Closed(false)];
+        assert_eq!(tick(Some(CarState::B), 400), (offered, opens));
+        // Each of these opens a closed contactor, after the pilot has said so.
+        let lost = [
+            Some(CarState::A),
+            Some(CarState::D),
+            Some(CarState::E),
+            Some(CarState::F),
+            None,
+        ];
+        for (n, car) in (5u32..).zip(lost) {
+            assert_eq!(tick(Some(CarState::C), 200 * n), (offered, closes.clone()));
+            let opens = std::vec![Offered(0), Closed(false)];
+            assert_eq!(tick(car, 200 * n + 100), (paused, opens), "{car:?}");
+        }
+    }
+
+    #[test]
+    fn a_charger_at_rest_offers_nothing_and_is_open() {
+        let log = Log::default();
+        let mut charger = Unidirectional::new(
+            LoggedPilot(log.clone()),
+            LoggedCoil(log.clone()),
+            ContactorTimes::DEFAULT,
+            Threshold::from_ppm(0),
+            Limits::all(32_000),
+        );
+        assert_eq!(charger.rest(0), Ok(SetPoint::Paused));
+        assert_eq!(log.take(), [Seen::Offered(0), Seen::Closed(false)]);
     }
 }

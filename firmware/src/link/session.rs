@@ -26,8 +26,8 @@ use crate::units::{Participation, State};
 
 /// Timer of the zero-crossing source \[Hz\].
 pub const TIMER_HZ: u32 = 1_000_000;
-/// Counts of the pilot's period: 1 kHz from the 84 MHz timer clock of the board, divided by ten.
-pub const PILOT_COUNTS: u16 = 8_400;
+/// Counts of the pilot's period: 1 kHz from the 84 MHz timer clock of the board, divided by two.
+pub const PILOT_COUNTS: u16 = 42_000;
 
 /// The wires between the host and the charger's drivers.
 #[derive(Debug, Default)]
@@ -186,6 +186,13 @@ impl Dispatch for AnyDispatch<'_> {
         match self {
             Self::Unidirectional(charger) => charger.apply(participation, now_ms),
             Self::Bidirectional(charger) => charger.apply(participation, now_ms),
+        }
+    }
+
+    fn rest(&mut self, now_ms: u32) -> Result<SetPoint, DispatchError> {
+        match self {
+            Self::Unidirectional(charger) => charger.rest(now_ms),
+            Self::Bidirectional(charger) => charger.rest(now_ms),
         }
     }
 }

@@ -1,4 +1,5 @@
-//! What stands in for a charger's hardware: a frequency meter with its errors, a pilot, a contactor, a power stage.
+//! What stands in for a charger's hardware: a frequency meter with its errors, a pilot, a
+//! contactor, a power stage.
 
 use core::convert::Infallible;
 use core::num::NonZeroU16;
@@ -176,6 +177,13 @@ impl Dispatch for Dispatcher {
         match self {
             Self::Unidirectional(dispatch) => dispatch.apply(participation, now_ms),
             Self::Bidirectional(dispatch) => dispatch.apply(participation, now_ms),
+        }
+    }
+
+    fn rest(&mut self, now_ms: u32) -> Result<SetPoint, DispatchError> {
+        match self {
+            Self::Unidirectional(dispatch) => dispatch.rest(now_ms),
+            Self::Bidirectional(dispatch) => dispatch.rest(now_ms),
         }
     }
 }

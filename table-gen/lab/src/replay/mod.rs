@@ -84,6 +84,10 @@ impl Dispatch for NoCar {
     fn apply(&mut self, _: Participation, _: u32) -> Result<SetPoint, DispatchError> {
         Ok(SetPoint::Paused)
     }
+
+    fn rest(&mut self, _: u32) -> Result<SetPoint, DispatchError> {
+        Ok(SetPoint::Paused)
+    }
 }
 
 /// There is nothing to reset.
