@@ -85,7 +85,9 @@ fn ranks_of(mpirun: &Child) -> Vec<u32> {
 #[test]
 fn a_rank_that_dies_ends_the_job_and_nothing_is_told() {
     let mut job = mpirun(3)
-        .args(["synth", "gb-bi", "--json"])
+        // 47 million cells.
+        .args(["synth", "paper-bi", "--json"])
+        .args(["--set", "grid.width=[0.005,0.025,0.05,0.05]"])
         .stdout(Stdio::piped())
         .stderr(Stdio::piped())
         .spawn()
@@ -96,7 +98,7 @@ fn a_rank_that_dies_ends_the_job_and_nothing_is_told() {
         std::thread::sleep(Duration::from_millis(50));
     }
     // Long enough for the games to have begun, short of their end.
-    std::thread::sleep(Duration::from_secs(2));
+    std::thread::sleep(Duration::from_secs(1));
     assert!(job.try_wait().unwrap().is_none(), "the job ended too soon");
     let victim = ranks_of(&job)[1];
     let killed = Command::new("kill")
