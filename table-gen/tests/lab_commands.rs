@@ -1,6 +1,7 @@
 //! The commands of the laboratory: equal numbers in equal questions, and bad input answered by exit code 2.
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on fails")]
 
+use std::path::Path;
 use std::process::{Command, Output};
 
 use model::spec::Spec;
@@ -107,6 +108,18 @@ fn bad_input_is_named() {
         &["--draws = 0"],
     );
     refused(&["report", "paper-bi", "--runs", "0"], &["--runs = 0"]);
+    refused(
+        &["compare", "paper-bi", "--chargers", "0"],
+        &["--chargers = 0", "1 to"],
+    );
+    refused(
+        &["compare", "paper-bi", "--loss-gw", "2,1"],
+        &["upside down"],
+    );
+    refused(
+        &["compare", "paper-bi", "--inertia", "4,0"],
+        &["--inertia = 0"],
+    );
     refused(
         &["report", "paper-bi", "--trace", "none-such.csv"],
         &["none-such.csv"],
@@ -249,4 +262,46 @@ fn the_report_the_runs_and_the_replays_agree() {
         &seed,
     ];
     assert_eq!(json(&again)["nadir_hz"], runs["worst"]["nadir_hz"]);
+    compare_agrees(dir.path(), &json);
+}
+
+/// The scorecard has a row for each controller, loss and inertia, and the numbers of `simulate`
+/// where nobody errs: without a response, exactly the same plant.
+fn compare_agrees(dir: &Path, json: &dyn Fn(&[&str]) -> Value) {
+    let csv = dir.join("compare.csv");
+    let figures = dir.join("figures");
+    let found = json(&[
+        "compare",
+        "paper-bi",
+        "--loss-gw",
+        "1.9,2.1",
+        "--inertia",
+        "2.8,4",
+        "--csv",
+        csv.to_str().unwrap(),
+        "--figures",
+        figures.to_str().unwrap(),
+    ]);
+    let rows = found["rows"].as_array().unwrap();
+    assert_eq!(rows.len(), 3 * 2 * 4);
+    assert_eq!(found["compared"], 6);
+    let row = |controller: &str| {
+        let is = |row: &&Value| {
+            row["loss_gw"] == 2.0
+                && row["inertia_gw_s_per_hz"] == 4.0
+                && row["controller"] == controller
+        };
+        rows.iter().find(is).unwrap()
+    };
+    let without = crate::json(&["simulate", "paper-bi", "--controller", "none", "--json"]);
+    for key in ["nadir_hz", "final_hz", "seconds_below_49_5"] {
+        // 1 ms of Runge-Kutta against exact steps of 10 ms: the printed digits.
+        let (exact, other) = (row("none")[key].as_f64(), without[key].as_f64());
+        assert!((exact.unwrap() - other.unwrap()).abs() < 1e-4, "{key}");
+    }
+    assert!(row("limit")["nadir_hz"].as_f64() > row("droop")["nadir_hz"].as_f64());
+    let lines = std::fs::read_to_string(csv).unwrap().lines().count();
+    assert_eq!(lines, 1 + rows.len());
+    // Two figures for each inertia, as .svg and .csv, and the page.
+    assert_eq!(std::fs::read_dir(figures).unwrap().count(), 2 * 2 * 2 + 1);
 }

@@ -5,6 +5,7 @@
 //! | [`simulation`] | a table, or a baseline | the grid's frequency in time |
 //! | [`fleet`] | a table | the same with one firmware for each charger |
 //! | [`record`] | a recorded frequency as text | samples at one interval |
+//! | [`compare`] | a table | a scorecard: no response, droop, table and the limit side by side |
 //! | [`replay`] | a recorded frequency | what the firmware would have done |
 //! | [`falsify`] | a table and a spec | a real trajectory that breaks a claim, if a search finds one |
 //! | [`counterfactual`] | a recorded event | what it would have been with the chargers |
@@ -13,6 +14,7 @@
 //! | [`report`] | runs and findings | one HTML page and its figures |
 #![forbid(unsafe_code)]
 
+pub mod compare;
 pub mod counterfactual;
 pub mod falsify;
 pub mod fleet;

@@ -43,6 +43,18 @@ impl FromStr for PerState {
     }
 }
 
+/// One number or more.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Numbers(pub(super) Vec<f64>);
+
+impl FromStr for Numbers {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        numbers(text).map(Self)
+    }
+}
+
 fn numbers(text: &str) -> Result<Vec<f64>, String> {
     text.split(',')
         .map(|part| {
@@ -72,5 +84,7 @@ mod tests {
         }
         assert_eq!("1,2,3,4".parse(), Ok(PerState([1.0, 2.0, 3.0, 4.0])));
         assert!("1,2,3".parse::<PerState>().is_err());
+        assert_eq!("1, 2,3".parse(), Ok(Numbers(vec![1.0, 2.0, 3.0])));
+        assert!("1,,3".parse::<Numbers>().is_err());
     }
 }

@@ -12,8 +12,10 @@ use serde::Serialize;
 use super::checkpoint::CheckpointArgs;
 use super::files::write_all;
 use super::synth::SynthReport;
-use super::{Failure, OutputArgs, SpecArgs, output, progress, simulate, verify};
-use lab::report::{self, Findings};
+use super::{Failure, OutputArgs, SpecArgs, compare, output, progress, simulate, verify};
+use lab::compare::CompareConfig;
+use lab::compare::verdict::Verdict;
+use lab::report::{self, Findings, scorecard};
 use lab::simulation::closed_loop::{self, Estimator};
 use lab::simulation::monitor::Summary;
 use lab::simulation::scenario::Scenario;
@@ -98,6 +100,8 @@ struct BuildReport<'r> {
     reach_within_s: Option<f64>,
     simulation: &'r Summary,
     phases: &'r [PhaseSpan],
+    /// Where the table loses to the droop, at the spec's inertia.
+    compare: &'r Verdict,
 }
 
 /// Runs the command.
@@ -120,6 +124,9 @@ pub(super) fn run(args: &BuildArgs) -> Result<(), Failure> {
         TableView::parse(&bytes).map_err(|error| Failure::BadInput(format!("{error:?}")))?;
     let run = closed_loop::simulate(&spec, &table, &Scenario::of(&spec), Estimator::FullState)
         .map_err(Failure::bad)?;
+    let config = CompareConfig::of(&spec);
+    let found = compare::scorecard_of(&spec, &table, &config)?;
+    let against_droop = Verdict::of(&found, &config.chargers);
     let verdict = verify::examine(&bytes, &spec)?;
     let result = BuildReport {
         synth: &synth,
@@ -132,6 +139,7 @@ pub(super) fn run(args: &BuildArgs) -> Result<(), Failure> {
             .and_then(|claim| claim.bound),
         simulation: &run.summary,
         phases: &run.phases,
+        compare: &against_droop,
     };
     let json = serde_json::to_string_pretty(&result).map_err(Failure::bad)?;
     let verdict_json = serde_json::to_string_pretty(&verdict).map_err(Failure::bad)?;
@@ -141,7 +149,8 @@ pub(super) fn run(args: &BuildArgs) -> Result<(), Failure> {
         verdict: Some(verdict.clone()),
         budget: Some(budget),
     };
-    let page = report::render(&spec, &bytes, &[], &findings, Vec::new()).map_err(Failure::bad)?;
+    let more = vec![scorecard::scorecard(&spec.name, &config, &found)];
+    let page = report::render(&spec, &bytes, &[], &findings, more).map_err(Failure::bad)?;
     // A table that is not proven must not be flashed by mistake for one that is.
     let table_name = if verdict.verified {
         "table.bin"
@@ -159,6 +168,7 @@ pub(super) fn run(args: &BuildArgs) -> Result<(), Failure> {
     if args.output.json {
         output::line(json);
     } else {
+        output::line(against_droop.sentence());
         synth.print();
         print_encodings(&result);
         verify::print(&verdict);

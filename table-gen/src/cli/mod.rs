@@ -7,6 +7,7 @@ mod band;
 mod budget;
 mod build;
 mod checkpoint;
+mod compare;
 mod counterfactual;
 mod falsify;
 mod files;
@@ -52,6 +53,8 @@ enum Command {
     Synth(synth::SynthArgs),
     /// Run the grid with no response, the baseline droop or the firmware on a table
     Simulate(simulate::SimulateArgs),
+    /// The scorecard: a table beside no response, the droop and full response at once, over losses and inertias
+    Compare(compare::CompareArgs),
     /// A recorded event with the fleet responding: what the frequency would have been
     Counterfactual(counterfactual::CounterfactualArgs),
     /// Run every charger with its own firmware, meter, clock and faults
@@ -182,6 +185,7 @@ pub(crate) fn run() -> ExitCode {
         Command::Build(args) => build::run(&args),
         Command::Synth(args) => synth::run(&args),
         Command::Simulate(args) => simulate::run(&args),
+        Command::Compare(args) => compare::run(&args),
         Command::Counterfactual(args) => counterfactual::run(&args),
         Command::Fleet(args) => fleet::run(&args),
         Command::Report(args) => report::run(&args),

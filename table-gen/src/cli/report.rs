@@ -8,14 +8,15 @@ use serde::de::DeserializeOwned;
 
 use super::files::write_all;
 use super::record::RecordOptions;
-use super::{Failure, OutputArgs, SpecArgs, output, progress};
+use super::{Failure, OutputArgs, SpecArgs, compare, output, progress};
+use lab::compare::CompareConfig;
 use lab::counterfactual::{self, Question};
 use lab::fleet::{self, FleetConfig, INSTANCES_MAX};
 use lab::record::Record;
 use lab::replay;
 use lab::report::section::Section;
 use lab::report::study::Study;
-use lab::report::{self, Findings, ROBUSTNESS_RUNS};
+use lab::report::{self, Findings, ROBUSTNESS_RUNS, scorecard};
 use lab::simulation::monitor::Summary;
 use lab::simulation::monte_carlo::{RUNS_MAX, Statistics};
 use lab::simulation::scenario::Scenario;
@@ -103,6 +104,7 @@ pub(super) fn run(args: &ReportArgs) -> Result<(), Failure> {
     }
     let mut more = Vec::new();
     if let Some(study) = studies.first() {
+        more.push(scorecard_section(study)?);
         if let Some(instances) = args.fleet {
             more.push(fleet_section(study, instances)?);
         }
@@ -141,6 +143,16 @@ pub(super) fn run(args: &ReportArgs) -> Result<(), Failure> {
         args.out.display()
     ));
     Ok(())
+}
+
+/// The section of the scorecard, at the spec's inertia.
+fn scorecard_section(study: &Study) -> Result<Section, Failure> {
+    let parsed = TableView::parse(&study.table);
+    let table = parsed.map_err(|error| Failure::BadInput(format!("{error:?}")))?;
+    let config = CompareConfig::of(&study.spec);
+    let found = compare::scorecard_of(&study.spec, &table, &config)?;
+    let name = study.spec.name.as_str();
+    Ok(scorecard::scorecard(name, &config, &found))
 }
 
 /// The section of the fleet, on the scenario of the command `fleet`.

@@ -55,8 +55,9 @@ type Root<'a> = DrawingArea<SVGBackend<'a>, Shift>;
 fn draw(figure: &Figure, root: &Root<'_>) -> Result<(), String> {
     let (legend, plot) = root.split_vertically(LEGEND_PX);
     draw_legend(figure, &legend).map_err(|error| error.to_string())?;
-    let (start, end) = figure.time_s;
+    let (start, end) = figure.shown;
     let (low, high) = figure.values;
+    let digits = figure.axis.digits();
     let label = |colour: Colour| ("sans-serif", LABEL_PX).into_font().color(&colour.rgb());
     let fail = |error: DrawingAreaErrorKind<std::io::Error>| error.to_string();
     let mut chart = ChartBuilder::on(&plot)
@@ -80,11 +81,11 @@ fn draw(figure: &Figure, root: &Root<'_>) -> Result<(), String> {
         .bold_line_style(Colour::Mesh.rgb())
         .axis_style(Colour::Muted.rgb())
         .label_style(label(Colour::Muted))
-        .x_desc("Time since the start [s]")
+        .x_desc(figure.axis.label())
         .y_desc(figure.value_label)
         .axis_desc_style(label(Colour::Ink))
         .x_labels(13)
-        .x_label_formatter(&|time| format!("{time:.0}"))
+        .x_label_formatter(&|place| format!("{place:.digits$}"))
         .y_labels(9)
         .draw()
         .map_err(fail)?;

@@ -1,6 +1,6 @@
 //! Figures of frequency and participation over time, and their parts.
 
-use super::figure::{Curve, Figure, Stretch, ValueBand, thin};
+use super::figure::{Axis, Curve, Figure, Stretch, ValueBand, thin};
 use super::palette::Colour;
 use crate::simulation::NOMINAL_HZ;
 use crate::simulation::trajectory::{PhaseSpan, Run};
@@ -108,7 +108,8 @@ pub(super) fn frequency_figure(
         description,
         value_label: "Frequency [Hz]",
         digits: 4,
-        time_s: (0.0, SHOWN_S),
+        axis: Axis::Time,
+        shown: (0.0, SHOWN_S),
         values: (floor, ceiling + 0.05),
         curves,
         stretches: stretches(phases),
@@ -131,7 +132,8 @@ pub(super) fn participation_figure(
         description,
         value_label: "Participation [%]",
         digits: 1,
-        time_s: (0.0, SHOWN_S),
+        axis: Axis::Time,
+        shown: (0.0, SHOWN_S),
         values: (0.0, 105.0),
         curves,
         stretches: stretches(phases),

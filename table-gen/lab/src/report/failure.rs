@@ -4,7 +4,7 @@ use model::spec::Spec;
 use model::verdict::{ClaimName, Counterexample, RealPath, ShownStep, Verdict};
 
 use super::curves::{bands, floor_hz};
-use super::figure::{Curve, Figure, RangeOverTime, Stretch};
+use super::figure::{Axis, Curve, Figure, RangeOverTime, Stretch};
 use super::palette::Colour;
 use super::section::{DataTable, Section};
 use crate::simulation::NOMINAL_HZ;
@@ -101,7 +101,8 @@ fn figure(
         ),
         value_label: "Frequency [Hz]",
         digits: 4,
-        time_s: (start, end),
+        axis: Axis::Time,
+        shown: (start, end),
         values: (lowest, highest + 0.05),
         curves,
         stretches: stretches(steps, end),

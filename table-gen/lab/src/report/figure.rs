@@ -4,14 +4,60 @@ use std::fmt::Write as _;
 
 use super::palette::Colour;
 
-/// A curve over time.
+/// Intervals of the table of a figure over time.
+const TABLE_INTERVALS: u32 = 24;
+
+/// What a figure is drawn over.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Axis {
+    /// Time since the start \[s\].
+    Time,
+    /// Lost infeed \[GW\].
+    Loss,
+}
+
+impl Axis {
+    /// Label below the chart.
+    pub const fn label(self) -> &'static str {
+        match self {
+            Self::Time => "Time since the start [s]",
+            Self::Loss => "Lost infeed [GW]",
+        }
+    }
+
+    /// Head of the column in the table.
+    pub const fn head(self) -> &'static str {
+        match self {
+            Self::Time => "Time [s]",
+            Self::Loss => "Loss [GW]",
+        }
+    }
+
+    /// Name of the column in the data.
+    pub const fn column(self) -> &'static str {
+        match self {
+            Self::Time => "time_s",
+            Self::Loss => "loss_gw",
+        }
+    }
+
+    /// Digits of a label below the chart.
+    pub const fn digits(self) -> usize {
+        match self {
+            Self::Time => 0,
+            Self::Loss => 1,
+        }
+    }
+}
+
+/// A curve over the axis: time, unless the figure says otherwise.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Curve {
     /// Name in the legend and the data.
     pub name: String,
     /// How it is drawn.
     pub colour: Colour,
-    /// Time \[s\] and value, times rising.
+    /// Place on the axis (time \[s\] or loss \[GW\]) and value, places rising.
     pub points: Vec<(f64, f64)>,
 }
 
@@ -65,7 +111,7 @@ pub struct RangeOverTime {
     pub spans: Vec<(f64, f64, f64)>,
 }
 
-/// A chart over time.
+/// A chart over its axis.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Figure {
     /// File name without its ending, and identifier in the page.
@@ -78,8 +124,10 @@ pub struct Figure {
     pub value_label: &'static str,
     /// Digits of a value in the table.
     pub digits: usize,
-    /// Time shown \[s\].
-    pub time_s: (f64, f64),
+    /// What it is drawn over.
+    pub axis: Axis,
+    /// Part of the axis that is shown \[s or GW\].
+    pub shown: (f64, f64),
     /// Values shown.
     pub values: (f64, f64),
     /// Curves.
@@ -93,9 +141,9 @@ pub struct Figure {
 }
 
 impl Figure {
-    /// Everything that is drawn, one value a line: `curve,time_s,value` for curves, and the ends of stretches and bands.
+    /// Everything that is drawn, one value a line: kind, name, place on the axis and value for curves, and the ends of stretches and bands.
     pub fn csv(&self) -> String {
-        let mut out = String::from("kind,name,time_s,value\n");
+        let mut out = format!("kind,name,{},value\n", self.axis.column());
         // Writing to a string cannot fail.
         for curve in &self.curves {
             for (time, value) in &curve.points {
@@ -122,14 +170,21 @@ impl Figure {
         out
     }
 
-    /// Rows of the text alternative: a time and each curve's value, at about `rows` even times.
-    pub fn table(&self, rows: usize) -> Vec<(f64, Vec<Option<f64>>)> {
-        let (start, end) = self.time_s;
-        let rows = rows.max(1);
-        (0..=rows)
-            .map(|row| start + (end - start) * row as f64 / rows as f64)
-            .map(|time| (time, self.curves.iter().map(|c| c.at(time)).collect()))
-            .collect()
+    /// Rows of the text alternative: a place on the axis and each curve's value. Time is cut into even intervals; losses are
+    /// shown at every point of the first curve.
+    pub fn table(&self) -> Vec<(f64, Vec<Option<f64>>)> {
+        let (start, end) = self.shown;
+        let places: Vec<f64> = match self.axis {
+            Axis::Time => (0..=TABLE_INTERVALS)
+                .map(|row| start + (end - start) * f64::from(row) / f64::from(TABLE_INTERVALS))
+                .collect(),
+            Axis::Loss => {
+                let first = self.curves.first();
+                first.map_or(Vec::new(), |c| c.points.iter().map(|(x, _)| *x).collect())
+            }
+        };
+        let row = |x: f64| (x, self.curves.iter().map(|c| c.at(x)).collect());
+        places.into_iter().map(row).collect()
     }
 }
 

@@ -1,6 +1,6 @@
 //! The section of the fleet: what its chargers give together, against what one firmware that knows the state asks for.
 
-use super::figure::{Curve, Figure, thin};
+use super::figure::{Axis, Curve, Figure, thin};
 use super::palette::Colour;
 use super::responses::summaries;
 use super::section::{DataTable, Section};
@@ -66,7 +66,8 @@ pub fn fleet(spec: &str, config: &FleetConfig, run: &FleetRun) -> Section {
         description: "Participation that one firmware told the true state asks for, the mean of what the chargers ask for, and what the fleet gives.".to_owned(),
         value_label: "Participation [%]",
         digits: 1,
-        time_s: (0.0, run.samples.last().map_or(1.0, |s| s.time_s)),
+        axis: Axis::Time,
+        shown: (0.0, run.samples.last().map_or(1.0, |s| s.time_s)),
         values: (0.0, 105.0),
         curves: vec![
             curve("told the state", Colour::Without, |s| s.told),

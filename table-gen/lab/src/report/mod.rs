@@ -6,6 +6,7 @@
 //! | [`section`], [`figure`] | the page as data |
 //! | [`responses`] | the event, the laws against the baseline, their robustness, Table II |
 //! | [`record`] | the recorded event: replay and counterfactual |
+//! | [`scorecard`] | the table beside no response, the droop and the limit, over the loss |
 //! | [`fleet`] | every charger with its own firmware |
 //! | [`limits`] | plants beyond the paper's, and what is outside the proof |
 //! | [`proof`] | verdict, budget, spec and hashes |
@@ -24,6 +25,7 @@ pub mod palette;
 pub mod proof;
 pub mod record;
 pub mod responses;
+pub mod scorecard;
 pub mod section;
 pub mod study;
 

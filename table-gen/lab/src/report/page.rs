@@ -7,9 +7,6 @@ use super::figure::Figure;
 use super::section::{DataTable, Section};
 use super::{FigureFile, Rendered, ReportError};
 
-/// Intervals of a figure's table.
-const TABLE_INTERVALS: usize = 24;
-
 /// The page of these sections, and its figures as files.
 ///
 /// # Errors
@@ -116,10 +113,10 @@ fn figure_markup(figure: &Figure, svg: &str) -> Markup {
 }
 
 fn data(figure: &Figure) -> DataTable {
-    let mut header = vec!["Time [s]"];
+    let mut header = vec![figure.axis.head()];
     header.extend(figure.curves.iter().map(|curve| curve.name.as_str()));
     let mut table = DataTable::new(format!("{}: {}", figure.title, figure.value_label), &header);
-    for (time, values) in figure.table(TABLE_INTERVALS) {
+    for (time, values) in figure.table() {
         let digits = figure.digits;
         let cells = values
             .iter()

@@ -1,6 +1,6 @@
 //! The sections of a recorded event: what the firmware would have done, and what would have become of the frequency.
 
-use super::figure::{Curve, Figure, Stretch, thin};
+use super::figure::{Axis, Curve, Figure, Stretch, thin};
 use super::palette::Colour;
 use super::section::{DataTable, Section};
 use crate::counterfactual::{Counterfactual, LIMITS, PlantAnswer};
@@ -77,7 +77,8 @@ pub fn replay(spec: &str, record: &Record, replay: &Replay) -> Section {
         description: reaction.clone(),
         value_label: "Frequency [Hz]",
         digits: 3,
-        time_s,
+        axis: Axis::Time,
+        shown: time_s,
         values: extent(&frequency),
         curves: frequency,
         stretches: stretches.clone(),
@@ -90,7 +91,8 @@ pub fn replay(spec: &str, record: &Record, replay: &Replay) -> Section {
         description: format!("At most {:.1} %.", 100.0 * replay.max_participation),
         value_label: "Participation [%]",
         digits: 1,
-        time_s,
+        axis: Axis::Time,
+        shown: time_s,
         values: (0.0, 105.0),
         curves: asked,
         stretches,
@@ -183,7 +185,8 @@ fn frequency_figure(found: &Counterfactual, plant: &PlantAnswer) -> Figure {
             .to_owned(),
         value_label: "Frequency [Hz]",
         digits: 3,
-        time_s: (0.0, found.recorded.last().map_or(1.0, |(time, _)| *time)),
+        axis: Axis::Time,
+        shown: (0.0, found.recorded.last().map_or(1.0, |(time, _)| *time)),
         values: extent(&curves),
         curves,
         stretches: Vec::new(),
@@ -218,7 +221,8 @@ fn missing_figure(found: &Counterfactual, plant: &PlantAnswer) -> Figure {
         ),
         value_label: "Missing power [GW]",
         digits: 2,
-        time_s: (0.0, found.recorded.last().map_or(1.0, |(time, _)| *time)),
+        axis: Axis::Time,
+        shown: (0.0, found.recorded.last().map_or(1.0, |(time, _)| *time)),
         values: extent(&curves),
         curves,
         stretches: Vec::new(),

@@ -1,0 +1,207 @@
+//! The scorecard: a table beside the droop, no response and the ideal one, at many losses and inertias.
+//!
+//! | controller | how it responds |
+//! |---|---|
+//! | none | not at all |
+//! | droop | a fleet of chargers, each with the spec's droop |
+//! | table | the same fleet, each with the firmware's control loop on the table |
+//! | limit | everything, at once and for good, at the moment f passes a trigger: what no real fleet beats by much |
+//!
+//! | module | holds |
+//! |---|---|
+//! | [`chargers`] | the fleet: own clocks, own meters, own delays |
+//! | [`course`] | the grid in time, and what is measured on the way |
+//! | [`verdict`] | where the table loses to the droop |
+
+pub mod chargers;
+pub mod course;
+pub mod verdict;
+
+use firmware::table::TableView;
+use rayon::prelude::*;
+use serde::Serialize;
+
+use chargers::{ChargersConfig, Kind};
+use course::Course;
+use model::plant::GridPlant;
+use model::spec::Spec;
+
+/// Losses of the scorecard unless asked otherwise: first, last and step, in tenths of a GW.
+pub const LOSSES_TENTHS: (u32, u32) = (3, 28);
+/// Chargers of the fleet unless asked otherwise.
+pub const CHARGERS: usize = 60;
+/// Most chargers: their control loops are kept for every run under way.
+pub const CHARGERS_MAX: usize = 100_000;
+/// Deviation at which the limit responds \[Hz\].
+pub const TRIGGER_HZ: f64 = -0.1;
+/// Length of a run \[s\].
+pub const DURATION_S: f64 = 300.0;
+
+/// Who controls the chargers.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Controller {
+    /// Nobody: the chargers do not respond.
+    None,
+    /// The spec's droop.
+    Droop,
+    /// The firmware with the table.
+    Table,
+    /// Full response at the trigger, without delay.
+    Limit,
+}
+
+impl Controller {
+    /// All of them, as the scorecard lists them.
+    pub const ALL: [Self; 4] = [Self::None, Self::Droop, Self::Table, Self::Limit];
+
+    /// The controller's name, as people and JSON read it.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::None => "none",
+            Self::Droop => "droop",
+            Self::Table => "table",
+            Self::Limit => "limit",
+        }
+    }
+}
+
+/// What is compared.
+#[derive(Debug, Clone, PartialEq)]
+pub struct CompareConfig {
+    /// Lost infeeds \[GW\].
+    pub losses_gw: Vec<f64>,
+    /// Inertias \[GW s/Hz\].
+    pub inertias: Vec<f64>,
+    /// Deviation at which the limit responds \[Hz\].
+    pub trigger_hz: f64,
+    /// Length of a run \[s\].
+    pub duration_s: f64,
+    /// The fleet of droop and table.
+    pub chargers: ChargersConfig,
+}
+
+impl CompareConfig {
+    /// The scorecard of a spec at its own inertia: 0.3 to 2.8 GW by 0.1, 60 chargers, 300 s.
+    pub fn of(spec: &Spec) -> Self {
+        let (first, last) = LOSSES_TENTHS;
+        Self {
+            losses_gw: (first..=last).map(|n| f64::from(n) / 10.0).collect(),
+            inertias: vec![spec.plant.inertia_gw_s_per_hz],
+            trigger_hz: TRIGGER_HZ,
+            duration_s: DURATION_S,
+            chargers: ChargersConfig::of(spec, CHARGERS),
+        }
+    }
+}
+
+/// One run.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Row {
+    /// Lost infeed \[GW\].
+    pub loss_gw: f64,
+    /// H \[GW s/Hz\].
+    pub inertia_gw_s_per_hz: f64,
+    /// Who controls.
+    pub controller: Controller,
+    /// What came of it.
+    #[serde(flatten)]
+    pub outcome: Outcome,
+}
+
+/// What a run is judged by.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Outcome {
+    /// Lowest frequency \[Hz, absolute\].
+    pub nadir_hz: f64,
+    /// When \[s after the event\].
+    pub nadir_time_s: f64,
+    /// Frequency at the end \[Hz, absolute\].
+    pub final_hz: f64,
+    /// Time below 49.5 Hz \[s\].
+    pub seconds_below_49_5: f64,
+    /// Energy that the fleet gave \[GW s\].
+    pub participation_gw_s: f64,
+    /// Changes of a charger's command by 5 % of full scale and more, on average.
+    pub changes_per_charger: f64,
+    /// The most of any charger.
+    pub changes_most: u32,
+    /// Highest less lowest frequency from 60 s on \[Hz\].
+    pub ripple_hz: f64,
+}
+
+/// All runs: by inertia, then loss, then controller.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Scorecard {
+    /// The runs.
+    pub rows: Vec<Row>,
+}
+
+/// Why there is no scorecard.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+pub enum CompareError {
+    /// The table's plant has a time constant that the observer cannot follow at its tick.
+    #[error("the observer cannot be made: {0:?}")]
+    Observer(firmware::observer::ObserverError),
+    /// The caller said to stop.
+    #[error("interrupted")]
+    Interrupted,
+}
+
+/// Runs every controller at every loss and inertia. `go_on` is asked before each run.
+///
+/// # Errors
+/// A table whose plant the observer cannot follow, or an interruption.
+pub fn compare(
+    spec: &Spec,
+    table: &TableView<'_>,
+    config: &CompareConfig,
+    go_on: &(dyn Fn() -> bool + Sync),
+) -> Result<Scorecard, CompareError> {
+    let mut runs = Vec::new();
+    for inertia in &config.inertias {
+        for loss in &config.losses_gw {
+            runs.extend(Controller::ALL.map(|controller| (*inertia, *loss, controller)));
+        }
+    }
+    let rows: Result<Vec<Row>, CompareError> = runs
+        .into_par_iter()
+        .map(|(inertia, loss_gw, controller)| {
+            if !go_on() {
+                return Err(CompareError::Interrupted);
+            }
+            let plant = GridPlant {
+                inertia,
+                ..GridPlant::new(spec)
+            };
+            Ok(Row {
+                loss_gw,
+                inertia_gw_s_per_hz: inertia,
+                controller,
+                outcome: run(spec, table, config, &plant, (loss_gw, controller))?,
+            })
+        })
+        .collect();
+    Ok(Scorecard { rows: rows? })
+}
+
+/// One run.
+fn run(
+    spec: &Spec,
+    table: &TableView<'_>,
+    config: &CompareConfig,
+    plant: &GridPlant,
+    (loss_gw, controller): (f64, Controller),
+) -> Result<Outcome, CompareError> {
+    let tick_ms = table.header().tick_ms;
+    let course = || Course::new(spec, plant, tick_ms, config.duration_s, loss_gw);
+    let kind = match controller {
+        Controller::None => return Ok(course().without()),
+        Controller::Limit => return Ok(course().limit(config.trigger_hz)),
+        Controller::Droop => Kind::Droop(spec),
+        Controller::Table => Kind::Table(table),
+    };
+    let chargers = chargers::Chargers::new(&kind, &config.chargers, tick_ms)
+        .map_err(CompareError::Observer)?;
+    Ok(course().with(chargers))
+}
