@@ -2,12 +2,16 @@
 //!
 //! A tick of the table is cut into ten parts. Charger i decides in part i mod 10. Its command acts after its own delay,
 //! which is constant over a run; the delays are spread evenly over the spec's range. Its meter errs by a uniform error
-//! within the spec's bound, drawn anew each tick. What the fleet gives is a sum of whole ppm: it does not depend on the
+//! within the spec's bound, drawn anew each tick, and reads what f was a while ago: its own lag, spread
+//! evenly over the meter's. Its levels are shifted as its serial number says. What the fleet gives is a sum of whole ppm: it does not depend on the
 //! order of the chargers.
+
+use std::collections::VecDeque;
 
 use firmware::control_loop::ControlLoop;
 use firmware::droop::Droop;
 use firmware::observer::{Observer, ObserverConfig, ObserverError};
+use firmware::response::LevelOffset;
 use firmware::table::TableView;
 use firmware::units::{MICRO, State};
 use rand::SeedableRng;
@@ -32,6 +36,8 @@ pub struct ChargersConfig {
     pub meter_hz: f64,
     /// Least and most delay of a charger \[s\].
     pub delay_s: [f64; 2],
+    /// Least and most lag of a charger's meter \[s\].
+    pub lag_s: [f64; 2],
     /// Seed of the meters' errors.
     pub seed: u64,
 }
@@ -42,7 +48,8 @@ impl ChargersConfig {
         Self {
             number,
             meter_hz: spec.uncertainty.measurement[0],
-            delay_s: [spec.uncertainty.actuation_delay_s; 2],
+            delay_s: *spec.uncertainty.actuation_delay_s.ends_s(),
+            lag_s: spec.meter.lag_ms().map(|ms| ms / 1000.0),
             seed: 0,
         }
     }
@@ -64,12 +71,28 @@ enum Law<'t> {
     Table(Box<(ControlLoop<'t>, Observer)>),
 }
 
+impl Law<'_> {
+    /// The same law with the levels of a serial number.
+    fn of_serial(&self, serial: u32) -> Self {
+        match self {
+            Self::Droop(droop) => Self::Droop(*droop),
+            Self::Table(table) => {
+                let (firmware, observer) = &**table;
+                let offset = LevelOffset::of_serial(serial);
+                Self::Table(Box::new((firmware.clone().with_offset(offset), *observer)))
+            }
+        }
+    }
+}
+
 #[derive(Debug, Clone)]
 struct Charger<'t> {
     law: Law<'t>,
     random: Pcg32,
     /// Parts of a tick from a decision to its power.
     delay_parts: usize,
+    /// Parts of a tick by which its meter lags.
+    lag_parts: usize,
     command_ppm: i64,
     /// The command when a change was counted last.
     counted_ppm: i64,
@@ -81,6 +104,8 @@ struct Charger<'t> {
 pub struct Chargers<'t> {
     chargers: Vec<Charger<'t>>,
     meter_uhz: f64,
+    /// Deviations of the last parts \[µHz\], the latest first: as many as the longest lag needs.
+    f_uhz: VecDeque<i32>,
     /// Changes of the sum that are under way \[ppm\], by the part in which they act, modulo the length.
     under_way: Vec<i64>,
     part: usize,
@@ -111,13 +136,20 @@ impl<'t> Chargers<'t> {
         };
         let part_s = f64::from(tick_ms) / 1000.0 / PARTS as f64;
         let [least, most] = config.delay_s.map(|s| (s / part_s).round());
+        let [lag_least, lag_most] = config.lag_s.map(|s| (s / part_s).round());
+        // The end of a range belongs to it.
+        let within = |least: f64, most: f64, share: f64| {
+            (least + ((most - least + 1.0) * share).floor()) as usize
+        };
         let chargers = (0..config.number).map(|index| {
             let share = (index as f64 * GOLDEN).fract();
+            // Another irrational: lags and delays are not paired.
+            let other = (index as f64 * GOLDEN.sqrt()).fract();
             Charger {
-                law: law.clone(),
+                law: law.of_serial(index as u32),
                 random: Pcg32::seed_from_u64(config.seed ^ ((index as u64) << 32)),
-                // The end of the range belongs to it.
-                delay_parts: (least + ((most - least + 1.0) * share).floor()) as usize,
+                delay_parts: within(least, most, share),
+                lag_parts: within(lag_least, lag_most, other),
                 command_ppm: 0,
                 counted_ppm: 0,
                 changes: 0,
@@ -126,6 +158,7 @@ impl<'t> Chargers<'t> {
         Ok(Self {
             chargers: chargers.collect(),
             meter_uhz: config.meter_hz * f64::from(MICRO),
+            f_uhz: vec![0; lag_most as usize + 1].into(),
             under_way: vec![0; most as usize + 1],
             part: 0,
             acting_ppm: 0,
@@ -134,10 +167,13 @@ impl<'t> Chargers<'t> {
 
     /// The next part of a tick, at a true deviation \[µHz\]. Returns the fleet's response, 0..=1.
     pub fn part(&mut self, f_uhz: i32) -> f64 {
+        self.f_uhz.pop_back();
+        self.f_uhz.push_front(f_uhz);
         let slots = self.under_way.len();
         let ready = self.chargers.iter_mut().skip(self.part % PARTS);
         for charger in ready.step_by(PARTS) {
-            let change = charger.tick(f_uhz, self.meter_uhz);
+            let read = self.f_uhz.get(charger.lag_parts).unwrap_or(&f_uhz);
+            let change = charger.tick(*read, self.meter_uhz);
             self.under_way[(self.part + charger.delay_parts) % slots] += change;
         }
         self.acting_ppm += std::mem::take(&mut self.under_way[self.part % slots]);
@@ -185,7 +221,7 @@ impl Charger<'_> {
 }
 
 /// The droop of a spec as a charger runs it: without the lag of the power electronics.
-fn droop(spec: &Spec) -> Droop {
+pub fn droop(spec: &Spec) -> Droop {
     let micro = |hz: f64| (hz * f64::from(MICRO)).round() as u32;
     Droop {
         deadband_uhz: micro(spec.baseline.deadband_hz),
@@ -203,6 +239,7 @@ mod tests {
             number: 20,
             meter_hz,
             delay_s,
+            lag_s: [0.0, 0.0],
             seed: 3,
         };
         Chargers::new(&Kind::Droop(&Spec::default()), &config, 100).unwrap()

@@ -179,6 +179,7 @@ mod tests {
             number: 60,
             meter_hz: 0.002,
             delay_s: [0.0, 0.0],
+            lag_s: [0.0, 0.0],
             seed: 0,
         };
         Verdict::of(&scorecard, &chargers)
