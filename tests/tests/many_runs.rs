@@ -183,6 +183,8 @@ fn fleet_of(instances: usize, failed_share: f64) -> FleetConfig {
     FleetConfig {
         instances,
         noise_hz: 0.001,
+        delay_s: [0.0, 0.0],
+        lag_s: [0.0, 0.0],
         failed_share,
         outages_per_hour: 20.0,
         outage_s: 2.0,

@@ -3,6 +3,7 @@
 //! | module | turns | into |
 //! |---|---|---|
 //! | [`simulation`] | a table, or a baseline | the grid's frequency in time |
+//! | [`car`] | a charger's set-point | the power that the grid sees |
 //! | [`fleet`] | a table | the same with one firmware for each charger |
 //! | [`record`] | a recorded frequency as text | samples at one interval |
 //! | [`compare`] | a table | a scorecard: no response, droop, table and the limit side by side |
@@ -14,6 +15,7 @@
 //! | [`report`] | runs and findings | one HTML page and its figures |
 #![forbid(unsafe_code)]
 
+pub mod car;
 pub mod compare;
 pub mod counterfactual;
 pub mod falsify;

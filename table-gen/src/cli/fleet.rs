@@ -35,14 +35,9 @@ pub(super) struct FleetArgs {
         allow_negative_numbers = true
     )]
     duration_s: f64,
-    /// Bound on the error of each charger's frequency meter, drawn each tick [Hz]
-    #[arg(
-        long,
-        value_name = "HZ",
-        default_value_t = 0.001,
-        allow_negative_numbers = true
-    )]
-    noise_hz: f64,
+    /// Bound on the error of each charger's frequency meter, drawn each tick [Hz]; default: the spec's
+    #[arg(long, value_name = "HZ", allow_negative_numbers = true)]
+    noise_hz: Option<f64>,
     /// Share of chargers that never respond
     #[arg(
         long,
@@ -94,6 +89,9 @@ struct FleetReport<'r> {
     #[serde(flatten)]
     summary: &'r Summary,
     fleet: &'r FleetMeasures,
+    changes_per_charger: f64,
+    contactor_operations_per_charger: f64,
+    outside_proven_hull_s: Option<f64>,
     /// Largest and mean distance of the response from what one firmware that is told the state asks for.
     gap_max: f64,
     gap_mean: f64,
@@ -103,14 +101,15 @@ struct FleetReport<'r> {
 pub(super) fn run(args: &FleetArgs) -> Result<(), Failure> {
     let spec = args.spec.load()?;
     let instances = args.chargers.unwrap_or(spec.fleet.chargers as usize);
+    let sound = FleetConfig::sound(&spec, instances);
     let config = FleetConfig {
-        instances,
-        noise_hz: args.noise_hz,
+        noise_hz: args.noise_hz.unwrap_or(sound.noise_hz),
         failed_share: args.failed,
         outages_per_hour: args.outages_per_hour,
         outage_s: args.outage_s,
         spread_clocks: !args.one_clock,
         seed: args.seed,
+        ..sound
     };
     let mut scenario = Scenario::of(&spec);
     scenario.duration_s = args.duration_s;
@@ -138,6 +137,9 @@ pub(super) fn run(args: &FleetArgs) -> Result<(), Failure> {
         duration_s: scenario.duration_s,
         summary: &run.summary,
         fleet: &run.measures,
+        changes_per_charger: run.measures.changes_per_charger,
+        contactor_operations_per_charger: run.measures.contactor_operations_per_charger,
+        outside_proven_hull_s: run.measures.outside_proven_hull_s,
         gap_max: gaps.clone().fold(0.0, f64::max),
         gap_mean: gaps.sum::<f64>() / run.samples.len().max(1) as f64,
     };
@@ -230,6 +232,31 @@ fn print(report: &FleetReport<'_>) {
                 "{:.1} on average, {} at most",
                 fleet.changes_mean, fleet.changes_max
             ),
+        ),
+        (
+            "changes of 5 % and more",
+            format!(
+                "{:.1} on average, {} at most",
+                fleet.changes_per_charger, fleet.changes_per_charger_max
+            ),
+        ),
+        (
+            "contactor operations",
+            format!(
+                "{:.2} on average, {} at most",
+                fleet.contactor_operations_per_charger, fleet.contactor_operations_max
+            ),
+        ),
+        (
+            "largest change in a second after 60 s",
+            format!("{:.2} % of the fleet", 100.0 * fleet.settled_change),
+        ),
+        (
+            "outside what the proof assumes",
+            match (fleet.outside_proven_hull_s, fleet.outside_proven_hull_by) {
+                (Some(s), Some(by)) => format!("{s:.2} s, by {:.2} % of the fleet", 100.0 * by),
+                _ => "the proof knows one participation".to_owned(),
+            },
         ),
         (
             "ticks without a reading",

@@ -159,7 +159,7 @@ fn scorecard_section(study: &Study) -> Result<Section, Failure> {
 fn fleet_section(study: &Study, instances: usize) -> Result<Section, Failure> {
     let parsed = TableView::parse(&study.table);
     let table = parsed.map_err(|error| Failure::BadInput(format!("{error:?}")))?;
-    let config = FleetConfig::sound(instances);
+    let config = FleetConfig::sound(&study.spec, instances);
     let scenario = Scenario {
         duration_s: fleet::DURATION_S,
         ..Scenario::of(&study.spec)

@@ -8,9 +8,12 @@
 //! |---|---|
 //! | [`trajectory`] | plant and firmware, from the event until a claim breaks |
 //! | [`adversaries`] | who chooses the disturbances |
+//! | [`crowd`] | chargers with own clocks and errors, whose commands act at any time within the delays |
+//! | `fleet` | the search against a whole fleet, on a plant and losses that are drawn |
 //! | [`witness`] | for a verdict's failure: a real trajectory that shows it |
 //!
-//! The search takes turns between three kinds of trajectory:
+//! Where a spec knows a fleet (own clocks, a range of delays, a band of the plant's parameters, or a
+//! response), the search is `fleet`'s. Else one charger stands for all, and the search takes turns between three kinds of trajectory:
 //!
 //! | kind | chooses |
 //! |---|---|
@@ -21,6 +24,8 @@
 //! The search is deterministic in its seed.
 
 pub mod adversaries;
+pub mod crowd;
+mod fleet;
 pub mod trajectory;
 pub mod witness;
 
@@ -60,6 +65,9 @@ pub fn falsify(
     seed: u64,
 ) -> Result<Falsification, TableError> {
     let table = TableView::parse(bytes)?;
+    if knows_a_fleet(spec) || table.response().is_some() {
+        return Ok(fleet::Fleets::new(&table, spec).search(steps, seed));
+    }
     let trajectories = Trajectories::new(&table, spec);
     let length_s = spec.requirements.horizon_s.unwrap_or(TRAJECTORY_S);
     let search = Search {
@@ -67,6 +75,16 @@ pub fn falsify(
         trajectories,
     };
     Ok(search.run(steps, seed))
+}
+
+/// Whether a spec says more of the fleet than one participation.
+fn knows_a_fleet(spec: &Spec) -> bool {
+    let uncertainty = &spec.uncertainty;
+    uncertainty.own_clocks
+        || uncertainty.actuation_delay_s.exact_s().is_none()
+        || uncertainty.inertia_gw_s_per_hz.is_some()
+        || uncertainty.governor_gain_gw_per_hz.is_some()
+        || uncertainty.damping_gw_per_hz.is_some()
 }
 
 struct Search<'a> {

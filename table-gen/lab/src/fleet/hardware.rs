@@ -3,6 +3,8 @@
 
 use core::convert::Infallible;
 use core::num::NonZeroU16;
+use core::sync::atomic::{AtomicU32, Ordering};
+use std::sync::Arc;
 
 use embedded_hal::digital::{ErrorType as PinError, OutputPin};
 use embedded_hal::pwm::{ErrorType as PwmError, SetDutyCycle};
@@ -108,20 +110,35 @@ impl SetDutyCycle for Pwm {
     }
 }
 
-/// A contactor's coil.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Coil;
+/// How often a contactor has moved; shared with whoever counts.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Operations(Arc<AtomicU32>);
 
-impl PinError for Coil {
+impl Operations {
+    /// Operations so far.
+    pub(super) fn number(&self) -> u32 {
+        self.0.load(Ordering::Relaxed)
+    }
+
+    /// Counts from here on.
+    pub(super) fn forget(&self) {
+        self.0.store(0, Ordering::Relaxed);
+    }
+}
+
+/// A contactor's coil: the firmware sets its pin only where the contactor is to move.
+impl PinError for Operations {
     type Error = Infallible;
 }
 
-impl OutputPin for Coil {
+impl OutputPin for Operations {
     fn set_low(&mut self) -> Result<(), Infallible> {
+        self.0.fetch_add(1, Ordering::Relaxed);
         Ok(())
     }
 
     fn set_high(&mut self) -> Result<(), Infallible> {
+        self.0.fetch_add(1, Ordering::Relaxed);
         Ok(())
     }
 }
@@ -149,16 +166,21 @@ impl Watchdog for NoWatchdog {
 /// The firmware's dispatcher of one direction or the other.
 #[derive(Debug)]
 pub(super) enum Dispatcher {
-    Unidirectional(Unidirectional<Pwm, Coil>),
+    Unidirectional(Unidirectional<Pwm, Operations>),
     Bidirectional(Bidirectional<Stage>),
 }
 
 impl Dispatcher {
     /// A charger that draws up to a current \[mA\].
-    pub(super) fn unidirectional(serial: u32, limit_ma: u32) -> Self {
-        let (times, threshold) = (ContactorTimes::DEFAULT, Threshold::of_serial(serial));
+    pub(super) fn unidirectional(
+        serial: u32,
+        limit_ma: u32,
+        times: ContactorTimes,
+        coil: Operations,
+    ) -> Self {
+        let threshold = Threshold::of_serial(serial);
         let limits = Limits::all(limit_ma);
-        Self::Unidirectional(Unidirectional::new(Pwm, Coil, times, threshold, limits))
+        Self::Unidirectional(Unidirectional::new(Pwm, coil, times, threshold, limits))
     }
 
     /// A charger that draws or feeds up to a power \[W\].

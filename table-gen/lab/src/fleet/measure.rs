@@ -4,10 +4,13 @@ use std::collections::VecDeque;
 
 use serde::Serialize;
 
+use super::instance::Counts;
 use crate::simulation::NOMINAL_HZ;
 
 /// Time over which a change of the response is measured \[s\].
 const CHANGE_OVER_S: f64 = 1.0;
+/// Time from which a grid counts as settled \[s\].
+const SETTLED_S: f64 = 60.0;
 
 /// Measures of a run.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -22,10 +25,25 @@ pub struct FleetMeasures {
     pub changed_at_once: f64,
     /// Highest frequency after the nadir \[Hz\]: the rebound.
     pub rebound_hz: f64,
+    /// Largest change of the response within a second from 60 s on, as a share of the fleet.
+    pub settled_change: f64,
     /// Mean number of changes of the set-point of a working charger.
     pub changes_mean: f64,
     /// The most of any charger.
     pub changes_max: u32,
+    /// Mean number of changes of a working charger's command by 5 % of full scale and more.
+    pub changes_per_charger: f64,
+    /// The most of any charger.
+    pub changes_per_charger_max: u32,
+    /// Mean number of operations of a working charger's contactor.
+    pub contactor_operations_per_charger: f64,
+    /// The most of any charger.
+    pub contactor_operations_max: u32,
+    /// Time in which the response lay outside of what the proof assumes of a fleet \[s\]; `null` for a
+    /// table by games, whose proof knows one participation.
+    pub outside_proven_hull_s: Option<f64>,
+    /// Farthest distance from it, as a share of the fleet.
+    pub outside_proven_hull_by: Option<f64>,
     /// Share of the working chargers' ticks without a reading.
     pub missed_share: f64,
 }
@@ -42,7 +60,21 @@ pub(super) struct Meters {
     changed: u32,
     lowest: f64,
     rebound: f64,
+    settled: f64,
+    settled_ticks: u64,
     ticks: u64,
+}
+
+/// What is known of a run once it is over.
+pub(super) struct Finish<'r> {
+    /// Chargers that never respond.
+    pub(super) failed: usize,
+    /// Of each working charger.
+    pub(super) counts: &'r [Counts],
+    /// Ticks without a reading, of all of them together.
+    pub(super) missed: u64,
+    /// Time outside the proven hull \[s\], and the farthest distance.
+    pub(super) outside: Option<(f64, f64)>,
 }
 
 impl Meters {
@@ -58,6 +90,8 @@ impl Meters {
             changed: 0,
             lowest: f64::INFINITY,
             rebound: f64::NEG_INFINITY,
+            settled: 0.0,
+            settled_ticks: (SETTLED_S / tick_s).round() as u64,
             ticks: 0,
         }
     }
@@ -68,6 +102,9 @@ impl Meters {
         for earlier in &self.window {
             self.rise = self.rise.max(given - earlier);
             self.fall = self.fall.max(earlier - given);
+            if self.ticks > self.settled_ticks {
+                self.settled = self.settled.max((earlier - given).abs());
+            }
         }
         if self.window.len() == self.window_ticks {
             self.window.pop_front();
@@ -81,19 +118,33 @@ impl Meters {
         self.rebound = self.rebound.max(f);
     }
 
-    /// The measures; `changes` of each working charger, and ticks missed by all of them together.
-    pub(super) fn finish(&self, failed: usize, changes: &[u32], missed: u64) -> FleetMeasures {
-        let working = changes.len().max(1) as f64;
-        let sum: u64 = changes.iter().map(|n| u64::from(*n)).sum();
+    /// The measures.
+    pub(super) fn finish(&self, finish: &Finish<'_>) -> FleetMeasures {
+        let working = finish.counts.len().max(1) as f64;
+        let of = |count: fn(&Counts) -> u32| {
+            let each = finish.counts.iter().map(count);
+            let sum: u64 = each.clone().map(u64::from).sum();
+            (sum as f64 / working, each.max().unwrap_or(0))
+        };
+        let (changes_mean, changes_max) = of(|counts| counts.set_points);
+        let (changes_per_charger, changes_per_charger_max) = of(|counts| counts.changes);
+        let (operations, operations_max) = of(|counts| counts.operations);
         FleetMeasures {
-            failed,
+            failed: finish.failed,
             rise_gw_per_s: self.rise * self.fleet_gw,
             fall_gw_per_s: self.fall * self.fleet_gw,
             changed_at_once: f64::from(self.changed) / self.instances,
             rebound_hz: NOMINAL_HZ + self.rebound,
-            changes_mean: sum as f64 / working,
-            changes_max: changes.iter().copied().max().unwrap_or(0),
-            missed_share: missed as f64 / (working * self.ticks.max(1) as f64),
+            settled_change: self.settled,
+            changes_mean,
+            changes_max,
+            changes_per_charger,
+            changes_per_charger_max,
+            contactor_operations_per_charger: operations,
+            contactor_operations_max: operations_max,
+            outside_proven_hull_s: finish.outside.map(|(seconds, _)| seconds),
+            outside_proven_hull_by: finish.outside.map(|(_, farthest)| farthest),
+            missed_share: finish.missed as f64 / (working * self.ticks.max(1) as f64),
         }
     }
 }

@@ -172,6 +172,10 @@ fn interval(range: &DelayRange) -> KeyValue<'_> {
         .map_or(KeyValue::Numbers(range.ends_s()), KeyValue::Number)
 }
 
+const SECONDS_2: Allowed = Allowed::Numbers {
+    len: 2,
+    each: Range::closed(0.0, 60.0),
+};
 const TIME_CONSTANT: Allowed = Allowed::Number(Range::closed(0.001, 1000.0));
 const DURATION: Range = Range::above(0.0, 86_400.0);
 const STATE: Allowed = Allowed::Numbers {
@@ -282,6 +286,27 @@ pub(super) const KEYS: &[Key] = &[
         "longest age of a reading when a decision goes by it", |s| KeyValue::Number(s.meter.latest_age_ms)),
     row("meter.bias_hz", "Hz", Allowed::Number(Range::closed(0.0, 0.1)),
         "largest constant error of a reading, the clock's apart", |s| KeyValue::Number(s.meter.bias_hz)),
+
+    row("charger.dead_time_s", "s", SECONDS_2,
+        "time until a car begins to answer, each its own", |s| KeyValue::Numbers(&s.charger.dead_time_s)),
+    row("charger.ramp_s", "s", SECONDS_2,
+        "time in which a car moves by its whole swing, each its own", |s| KeyValue::Numbers(&s.charger.ramp_s)),
+    row("charger.pilot_change_s", "s", Allowed::Number(Range::closed(0.0, 60.0)),
+        "least time between two changes of a pilot, except to pause", |s| KeyValue::Number(s.charger.pilot_change_s)),
+    row("charger.resume_above_floor_a", "A", Allowed::Number(Range::closed(0.0, 26.0)),
+        "current above 6 A from which a paused car is charged again", |s| KeyValue::Number(s.charger.resume_above_floor_a)),
+    row("charger.draw", "1", Allowed::Numbers { len: 2, each: Range::closed(0.0, 1.0) },
+        "largest draw of a car as a share of the rating, each its own", |s| KeyValue::Numbers(&s.charger.draw)),
+    row("charger.pausing_share", "1", Allowed::Number(Range::closed(0.0, 1.0)),
+        "share of the cars that pause by themselves", |s| KeyValue::Number(s.charger.pausing_share)),
+    row("charger.pause_s", "s", Allowed::Numbers { len: 2, each: Range::closed(0.0, 600.0) },
+        "length of such a pause", |s| KeyValue::Numbers(&s.charger.pause_s)),
+    row("charger.contactor_opens_after_s", "s", Allowed::Number(Range::closed(0.0, 86_400.0)),
+        "length of a pause after which the contactor opens", |s| KeyValue::Number(s.charger.contactor_opens_after_s)),
+    row("charger.contactor_open_least_s", "s", Allowed::Number(Range::closed(0.0, 86_400.0)),
+        "least time for which it then stays open", |s| KeyValue::Number(s.charger.contactor_open_least_s)),
+    row("charger.clock_ppm", "ppm", Allowed::Number(Range::closed(0.0, 1000.0)),
+        "error of a charger's clock, each its own within this", |s| KeyValue::Number(s.charger.clock_ppm)),
 
     row("uncertainty.loss_gw", "GW", Allowed::Numbers { len: 2, each: Range::closed(-100.0, 100.0) },
         "band of the lost infeed w", |s| KeyValue::Numbers(&s.uncertainty.loss_gw)),

@@ -21,6 +21,7 @@
 //! the structs and with their documentation.
 
 mod allowed;
+mod charger;
 mod claims;
 mod delay_range;
 mod error;
@@ -45,6 +46,7 @@ mod tests;
 mod validate;
 
 pub use allowed::{Allowed, Range};
+pub use charger::ChargerSpec;
 pub use claims::{Domain, InitialBox, LossProfile, RequirementsSpec, TableSpec, UncertaintySpec};
 pub use delay_range::DelayRange;
 pub use error::SpecError;

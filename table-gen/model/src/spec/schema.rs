@@ -3,8 +3,8 @@
 use serde::{Deserialize, Serialize};
 
 use super::{
-    BaselineSpec, FleetSpec, GridSpec, InputSpec, MeterSpec, MethodSpec, PlantSpec, PreferenceSpec,
-    RequirementsSpec, SamplingSpec, TableSpec, UncertaintySpec,
+    BaselineSpec, ChargerSpec, FleetSpec, GridSpec, InputSpec, MeterSpec, MethodSpec, PlantSpec,
+    PreferenceSpec, RequirementsSpec, SamplingSpec, TableSpec, UncertaintySpec,
 };
 
 /// A complete specification; one field per section of the TOML document.
@@ -34,6 +34,8 @@ pub struct Spec {
     pub preference: PreferenceSpec,
     /// What measures the frequency.
     pub meter: MeterSpec,
+    /// The car and the contactor of the laboratory's fleet.
+    pub charger: ChargerSpec,
     /// What is not known exactly, as bounds.
     pub uncertainty: UncertaintySpec,
     /// What is to be proved.
@@ -56,6 +58,7 @@ impl Default for Spec {
             sampling: SamplingSpec::default(),
             preference: PreferenceSpec::default(),
             meter: MeterSpec::default(),
+            charger: ChargerSpec::default(),
             uncertainty: UncertaintySpec::default(),
             requirements: RequirementsSpec::default(),
             table: TableSpec::default(),

@@ -37,6 +37,7 @@ impl Spec {
         check_input(&self.input, origin)?;
         check_sampling(&self.sampling, origin)?;
         check_uncertainty(&self.uncertainty, origin)?;
+        check_charger(self, origin)?;
         if !self.preference.always_on {
             check_delay(&self.uncertainty, &self.sampling, origin)?;
         }
@@ -146,6 +147,26 @@ fn check_sampling(sampling: &SamplingSpec, origin: &Origin) -> Result<(), SpecEr
             found,
             format!("at most {TICKS_MAX} ticks to the period"),
         ));
+    }
+    Ok(())
+}
+
+fn check_charger(spec: &Spec, origin: &Origin) -> Result<(), SpecError> {
+    let charger = &spec.charger;
+    for (key, unit, [low, high]) in [
+        ("charger.dead_time_s", " s", charger.dead_time_s),
+        ("charger.ramp_s", " s", charger.ramp_s),
+        ("charger.draw", "", charger.draw),
+        ("charger.pause_s", " s", charger.pause_s),
+    ] {
+        if low > high {
+            return Err(SpecError::Inverted {
+                origin: origin.of(key),
+                key,
+                found: format!("[{low}, {high}]{unit}"),
+                allowed: "[least, most] with least at most most".to_owned(),
+            });
+        }
     }
     Ok(())
 }

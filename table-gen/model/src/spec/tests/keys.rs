@@ -87,6 +87,7 @@ fn the_field_docs_agree_with_the_key_table() {
         include_str!("../claims.rs"),
         include_str!("../preference.rs"),
         include_str!("../meter.rs"),
+        include_str!("../charger.rs"),
     ]
     .concat();
     for doc in reference() {

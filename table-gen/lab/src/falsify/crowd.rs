@@ -1,0 +1,224 @@
+//! A crowd: chargers with own clocks and own meters' errors, whose commands may act at any time
+//! between the least and the most delay.
+//!
+//! Time goes in parts of a tick. A charger with a clock of its own decides in one part of each tick.
+//! A command decided in part a may act from a + d₁ on and is replaced at the latest when the next one
+//! has been under way for d₂. So at part b a charger's response is any of the commands decided from
+//! the last one not after b - d₂ to the last one not after b - d₁, each time another if it likes.
+//! The crowd gives the mean of the least and the mean of the greatest: every response between them
+//! is one of a real fleet, with these very chargers.
+
+use firmware::control_loop::ControlLoop;
+use firmware::response::LevelOffset;
+use firmware::table::TableView;
+use firmware::units::{MICRO, STATES, State};
+
+use super::adversaries::Random;
+
+/// Parts of a tick.
+pub const PARTS: usize = 10;
+
+/// How a meter errs within its bound.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Error {
+    /// At one end of it.
+    Constant(f64),
+    /// At one end for so many ticks, then at the other: a slope that is not there.
+    Alternating(u32),
+    /// Anywhere.
+    Random,
+}
+
+/// One charger.
+#[derive(Debug, Clone)]
+struct Member<'t> {
+    control: ControlLoop<'t>,
+    error: Error,
+    /// Part of the tick in which it decides.
+    clock: usize,
+    ticks: u32,
+    /// Commands of its last ticks \[ppm\], the latest at `ticks - 1` modulo the length.
+    commands_ppm: Vec<u32>,
+    /// Least and greatest response that it may give now \[ppm\].
+    span_ppm: (u32, u32),
+}
+
+/// What a crowd may do, in parts of a tick.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct CrowdTimes {
+    /// Least and most delay of a command.
+    pub delay: (usize, usize),
+    /// Lag of the meters.
+    pub lag: usize,
+}
+
+/// The chargers.
+#[derive(Debug, Clone)]
+pub struct Crowd<'t> {
+    members: Vec<Member<'t>>,
+    times: CrowdTimes,
+    /// Bound of the readings' errors \[Hz, GW\].
+    bound: [f64; STATES],
+    /// States where the last parts began, the latest first.
+    states: std::collections::VecDeque<[f64; STATES]>,
+    /// Sums of the members' spans \[ppm\].
+    sums_ppm: (u64, u64),
+    part: usize,
+    random: Random,
+}
+
+impl<'t> Crowd<'t> {
+    /// A crowd drawn: so many chargers on a grid that has been in a state for long. One crowd in four
+    /// has one clock.
+    pub fn draw(
+        table: &TableView<'t>,
+        number: usize,
+        times: CrowdTimes,
+        bound: [f64; STATES],
+        rest: [f64; STATES],
+        seed: u64,
+    ) -> Self {
+        let mut random = Random::new(seed);
+        let one_clock = random.number().is_multiple_of(4);
+        let same_sign = random.number().is_multiple_of(2);
+        let clock = (random.number() % PARTS as u64) as usize;
+        let sign = random.sign();
+        // What can be under way, and one more on each side.
+        let kept = times.delay.1 / PARTS + 3;
+        let members = (0..number).map(|index| {
+            let error = match random.number() % 4 {
+                _ if same_sign => Error::Constant(sign),
+                0 => Error::Alternating(1 + (random.number() % 12) as u32),
+                1 => Error::Random,
+                _ => Error::Constant(random.sign()),
+            };
+            let own = (random.number() % PARTS as u64) as usize;
+            let offset = LevelOffset::of_serial(index as u32);
+            Member {
+                control: ControlLoop::with_table(Ok(table.clone())).with_offset(offset),
+                error,
+                clock: if one_clock { clock } else { own },
+                ticks: 0,
+                commands_ppm: vec![0; kept],
+                span_ppm: (0, 0),
+            }
+        });
+        Self {
+            members: members.collect(),
+            times,
+            bound,
+            states: vec![rest; times.lag + 1].into(),
+            sums_ppm: (0, 0),
+            part: 0,
+            random,
+        }
+    }
+
+    /// The next part, at a true state: the least and the greatest response, as shares of the fleet.
+    pub fn part(&mut self, x: [f64; STATES]) -> (f64, f64) {
+        self.states.pop_back();
+        self.states.push_front(x);
+        let seen = self.states.back().copied().unwrap_or(x);
+        let now = self.part % PARTS;
+        let (least, most) = self.times.delay;
+        for member in &mut self.members {
+            if member.clock == now {
+                member.decide(&seen, &self.bound, &mut self.random);
+            }
+            let moves = |delay: usize| (member.clock + delay) % PARTS == now;
+            if moves(least) || moves(most) {
+                let before = member.span_ppm;
+                member.span_ppm = member.span(self.part, self.times);
+                let after = member.span_ppm;
+                let change = |sum: u64, from: u32, to: u32| sum + u64::from(to) - u64::from(from);
+                self.sums_ppm.0 = change(self.sums_ppm.0, before.0, after.0);
+                self.sums_ppm.1 = change(self.sums_ppm.1, before.1, after.1);
+            }
+        }
+        self.part += 1;
+        let all = f64::from(MICRO) * self.members.len() as f64;
+        (self.sums_ppm.0 as f64 / all, self.sums_ppm.1 as f64 / all)
+    }
+}
+
+impl Member<'_> {
+    fn decide(&mut self, x: &[f64; STATES], bound: &[f64; STATES], random: &mut Random) {
+        let error = match self.error {
+            Error::Constant(sign) => sign,
+            Error::Alternating(ticks) if (self.ticks / ticks).is_multiple_of(2) => 1.0,
+            Error::Alternating(_) => -1.0,
+            Error::Random => 2.0 * random.unit() - 1.0,
+        };
+        let read = |d: usize| ((x[d] + error * bound[d]) * f64::from(MICRO)).floor() as i32;
+        let action = self.control.step(State(std::array::from_fn(read)));
+        let kept = self.commands_ppm.len();
+        if let Some(place) = self.commands_ppm.get_mut(self.ticks as usize % kept) {
+            *place = action.participation.ppm();
+        }
+        self.ticks += 1;
+    }
+
+    /// Least and greatest of the commands that may act at a part.
+    fn span(&self, part: usize, times: CrowdTimes) -> (u32, u32) {
+        // Ticks decided up to a part so long ago: those at clock, clock + PARTS, ...
+        let decided = |delay: usize| {
+            let since = (part + PARTS).checked_sub(self.clock + delay);
+            since.map_or(0, |parts| parts / PARTS)
+        };
+        let (oldest, latest) = (decided(times.delay.1), decided(times.delay.0));
+        let kept = self.commands_ppm.len();
+        // Before the first decision nothing acts.
+        let first = oldest.saturating_sub(1);
+        let before = if oldest == 0 { Some(0) } else { None };
+        let commands = (first..latest).filter_map(|tick| self.commands_ppm.get(tick % kept));
+        let all = commands.copied().chain(before);
+        let (least, most) = all.fold((u32::MAX, 0), |(l, m), ppm| (l.min(ppm), m.max(ppm)));
+        (least.min(most), most)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn member(clock: usize, commands_ppm: &[u32]) -> Member<'static> {
+        Member {
+            control: ControlLoop::new(&[]),
+            error: Error::Constant(1.0),
+            clock,
+            ticks: commands_ppm.len() as u32,
+            commands_ppm: commands_ppm.to_vec(),
+            span_ppm: (0, 0),
+        }
+    }
+
+    #[test]
+    fn a_command_may_act_between_its_delays_until_the_next_must() {
+        // Ticks at parts 3, 13, 23, 33 decide 10, 20, 30, 40; delays of 1 to 2 ticks.
+        let times = CrowdTimes {
+            delay: (10, 20),
+            lag: 0,
+        };
+        let one = member(3, &[10, 20, 30, 40]);
+        // Before part 13 nothing can have come; the first may act from there on, and must from 23.
+        assert_eq!(one.span(12, times), (0, 0));
+        assert_eq!(one.span(13, times), (0, 10));
+        assert_eq!(one.span(22, times), (0, 10));
+        assert_eq!(one.span(23, times), (10, 20));
+        assert_eq!(one.span(33, times), (20, 30));
+        assert_eq!(one.span(43, times), (30, 40));
+    }
+
+    #[test]
+    fn without_a_range_there_is_no_choice() {
+        let times = CrowdTimes {
+            delay: (0, 0),
+            lag: 0,
+        };
+        let one = member(0, &[10, 20, 30]);
+        assert_eq!(one.span(0, times), (10, 10));
+        assert_eq!(one.span(9, times), (10, 10));
+        assert_eq!(one.span(10, times), (20, 20));
+        assert_eq!(one.span(29, times), (30, 30));
+    }
+}
