@@ -257,8 +257,8 @@ impl<'t> ControlLoop<'t> {
         }
     }
 
-    /// The readings that follow have nothing to do with those before. As [`ControlLoop::reset`], but
-    /// a response keeps its command and its slope response.
+    /// The readings that follow have nothing to do with those before. As [`ControlLoop::reset`],
+    /// but a response keeps its command and its slope response.
     pub fn lose_track(&mut self) {
         self.end_event();
         self.history = History::NONE;
