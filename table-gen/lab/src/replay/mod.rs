@@ -23,7 +23,7 @@ const ONSET_FALL_HZ: f64 = 0.1;
 /// ... within this time \[s\] is an event; quiet days stay below it.
 const ONSET_WITHIN_S: f64 = 2.0;
 /// Longest step of a record that shows when an event began \[s\]: two samples within
-/// [`ONSET_WITHIN_S`], and an onset that is known to half of it. From there on a reaction time says
+/// `ONSET_WITHIN_S`, and an onset that is known to half of it. From there on a reaction time says
 /// more about the record than about the charger.
 pub const REACTION_STEP_MAX_S: f64 = ONSET_WITHIN_S / 2.0;
 
