@@ -62,8 +62,11 @@ fn shipped_specs_load_and_have_the_papers_size() {
         let spec = Spec::load(name, &[]).unwrap();
         assert_eq!(spec.name, *name);
         assert_eq!(spec.input.levels(), 21);
-        let statutory = matches!(*name, "gb-bi-normal" | "gb-bi" | "gb-low-inertia");
-        let containment_hz = if statutory { -0.5 } else { -0.8 };
+        let containment_hz = match *name {
+            "gb-bi-normal" | "gb-bi" => -0.5,
+            "gb-low-inertia" => -0.6,
+            _ => -0.8,
+        };
         assert_eq!(spec.requirements.containment_hz, Some(containment_hz));
         let is_response = matches!(*name, "gb-bi" | "gb-uni" | "gb-low-inertia");
         assert_eq!(spec.preference.always_on, is_response);
