@@ -48,7 +48,6 @@ pub(crate) const STEPS: &[Step] = &[
     Step::cargo("docs", 30, "the documentation builds without warnings", "doc --workspace --no-deps --release").with(&[("RUSTDOCFLAGS", "-D warnings")]),
     Step::cargo("build-cores", 30, "the firmware library builds for Cortex-M4F (the reference board), Cortex-M0+ and RV32IMC (no FPU)", "build -p firmware --lib --profile firmware --target thumbv7em-none-eabihf --target thumbv6m-none-eabi --target riscv32imc-unknown-none-elf"),
     Step::cargo("host-tests", 480, "unit, property, documentation and cross-crate tests", "test --workspace --release"),
-    Step::cargo("mpi", 45, "two and three MPI ranks find what one finds; a rank that dies ends the job", "test -p table-gen --release --features mpi --test ranks"),
     Step::cargo("images", 120, "the images link, every build of the product too; ELF, BIN and HEX are written", "fw images"),
     Step::cargo("pil", 90, "the emulated processor and the host act alike, to the bit", "fw pil"),
     Step::cargo("pil-m0", 60, "code for Cortex-M0+, with floating point in software, acts alike to the bit", "fw pil --core m0 --scenarios 200"),
