@@ -7,9 +7,10 @@
 use std::path::{Path, PathBuf};
 use std::{env, fs, io};
 
-/// The table that `holdfast` carries unless `HOLDFAST_TABLE` names another, from the workspace's
-/// root.
-const TABLE_DEFAULT: &str = "firmware/tables/paper-bi.bin";
+/// The tables that `holdfast` carries unless `HOLDFAST_TABLE` names another, from the workspace's
+/// root: of a charger that can only stop charging, and of one that can feed the grid.
+const TABLE_UNIDIRECTIONAL: &str = "firmware/tables/gb-uni.bin";
+const TABLE_BIDIRECTIONAL: &str = "firmware/tables/gb-bi.bin";
 
 /// Boards and their memory maps, from the package's folder.
 const BOARDS: &str = "images/boards";
@@ -79,10 +80,17 @@ fn board(package: &Path) -> io::Result<String> {
 /// charger then starts with the droop until a table is flashed.
 fn table(root: &Path, out: &Path) -> io::Result<()> {
     let named = env::var_os("HOLDFAST_TABLE");
-    let path = root.join(named.clone().unwrap_or_else(|| TABLE_DEFAULT.into()));
+    let default = if env::var_os("CARGO_FEATURE_BIDIRECTIONAL").is_some() {
+        TABLE_BIDIRECTIONAL
+    } else {
+        TABLE_UNIDIRECTIONAL
+    };
+    let path = root.join(named.clone().unwrap_or_else(|| default.into()));
     println!("cargo::rerun-if-changed={}", path.display());
     let bytes = if named.is_none() && !path.exists() {
-        println!("cargo::warning={TABLE_DEFAULT} is missing: the image carries no table");
+        println!(
+            "cargo::warning={default} is missing: the image carries NO TABLE and runs on the droop"
+        );
         Vec::new()
     } else {
         fs::read(&path).map_err(|error| {

@@ -54,6 +54,7 @@ fn charge() -> Option<()> {
     let config = ChargerConfig {
         level_offset: LevelOffset::of_serial(started.serial),
         start_delay: StartDelay::street(started.serial),
+        installation: Some(output::INSTALLATION),
         ..ChargerConfig::DEFAULT
     };
     Runner::new(parts, table, config).run()

@@ -11,6 +11,10 @@
 //! the clock, or one backwards, makes the observer start again. A tick that comes too early
 //! advances nothing.
 //!
+//! ## Fit
+//! When it starts, a charger compares itself with what the proof of its table assumed ([`misfits`]).
+//! Where it is something else it runs the droop and says so at every tick.
+//!
 //! ## Energy
 //! Nothing is energised before a frequency has been believed and the delay of [`StartDelay`] has
 //! passed, nor after the mains has gone, until the same has happened again.
@@ -23,11 +27,13 @@
 
 mod clock;
 mod config;
+mod fit;
 mod report;
 mod start;
 
 pub use clock::CATCH_UP_TICKS_MAX;
 pub use config::{ChargerConfig, trust_ticks};
+pub use fit::{Installation, MeterFacts, Misfits, misfits};
 pub use report::Report;
 pub use start::StartDelay;
 
@@ -77,6 +83,8 @@ pub struct Charger<'t, S, D, W> {
     event: Option<EventWatch>,
     /// Restarted by a fault, and the warm-up that follows is not over.
     restarted: bool,
+    /// What the proof of the table assumed otherwise.
+    misfits: Misfits,
     warm_up_ticks: u16,
     warm_up_left: u16,
     lost_ticks: u16,
@@ -146,6 +154,13 @@ impl<'t, S: FrequencySource, D: Dispatch, W: Watchdog> Charger<'t, S, D, W> {
             let trusts = plant.filter(|_| !always_on);
             trusts.map_or(0, |plant| trust_ticks(&plant, tick_ms).max(delay_ticks))
         });
+        let misfits = match (&table, &config.installation) {
+            (Ok(view), Some(installation)) => {
+                let meter = MeterFacts::of(&source);
+                misfits(view.header(), installation, meter, config.filter_ticks)
+            }
+            _ => Misfits::NONE,
+        };
         let gate = Gate::new(
             config.gate,
             tick_ms,
@@ -165,6 +180,7 @@ impl<'t, S: FrequencySource, D: Dispatch, W: Watchdog> Charger<'t, S, D, W> {
             droop,
             event,
             restarted: cause != ResetCause::PowerOn,
+            misfits,
             warm_up_ticks,
             warm_up_left: warm_up_ticks,
             lost_ticks: 0,
@@ -229,6 +245,9 @@ impl<'t, S: FrequencySource, D: Dispatch, W: Watchdog> Charger<'t, S, D, W> {
         if self.control.table_error().is_some() {
             faults.insert(Faults::TABLE_REJECTED);
         }
+        if !self.misfits.is_empty() {
+            faults.insert(Faults::MISFIT);
+        }
         let window_fills = self
             .control
             .response()
@@ -260,6 +279,7 @@ impl<'t, S: FrequencySource, D: Dispatch, W: Watchdog> Charger<'t, S, D, W> {
             participation: standing.participation,
             set_point: applied.ok(),
             faults,
+            misfits: self.misfits,
         };
         self.changes.note(&report);
         report
@@ -345,9 +365,14 @@ impl<'t, S: FrequencySource, D: Dispatch, W: Watchdog> Charger<'t, S, D, W> {
     /// path commands once.
     fn decide(&mut self, due: u16, faults: &mut Faults) {
         let state = self.standing.state;
-        if self.warm_up_left > 0 {
-            self.warm_up_left -= 1;
-            self.standing.mode = Mode::WarmUp;
+        let warming_up = self.warm_up_left > 0;
+        if warming_up || !self.misfits.is_empty() {
+            self.warm_up_left = self.warm_up_left.saturating_sub(1);
+            self.standing.mode = if warming_up {
+                Mode::WarmUp
+            } else {
+                Mode::DroopMisfit
+            };
             self.standing.phase = Phase::Fallback;
             let participation = self.droop.participation(state);
             self.standing.participation = self.control.command(participation);

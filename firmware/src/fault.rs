@@ -33,9 +33,11 @@ impl Faults {
     pub const RESTARTED: Self = Self(1 << 10);
     /// The set-point did not reach the hardware.
     pub const DISPATCH: Self = Self(1 << 11);
+    /// The charger is not what the proof of its table assumed.
+    pub const MISFIT: Self = Self(1 << 12);
 
     /// Every fault with its name, in the order of the bits.
-    pub const NAMES: [(Self, &'static str); 12] = [
+    pub const NAMES: [(Self, &'static str); 13] = [
         (Self::BUS, "bus"),
         (Self::NO_SIGNAL, "no-signal"),
         (Self::STALE, "stale"),
@@ -48,6 +50,7 @@ impl Faults {
         (Self::CLOCK_JUMP, "clock-jump"),
         (Self::RESTARTED, "restarted"),
         (Self::DISPATCH, "dispatch"),
+        (Self::MISFIT, "misfit"),
     ];
 
     /// The bits, as telemetry carries them.
@@ -101,6 +104,7 @@ impl From<FrequencyError> for Faults {
 /// | `Hold` | no believed frequency | the last, held | frequency back, or `hold_ticks` |
 /// | `Safe` | frequency lost for longer | released step by step | frequency back |
 /// | `Release` | the end of an event | released while f is recovered | at zero; f below I1 |
+/// | `DroopMisfit` | the charger does not fit its table | droop on f | restart |
 ///
 /// Released step by step means: back to ordinary charging. In `Safe` without any signal the mains
 /// is taken for gone, and nothing is energised. [`crate::event`] says when an event ends.
@@ -122,11 +126,13 @@ pub enum Mode {
     Safe = 5,
     /// The event is over: step by step back to ordinary charging.
     Release = 6,
+    /// The charger is not what the proof of its table assumed: droop.
+    DroopMisfit = 7,
 }
 
 impl Mode {
     /// Modes in the order of their numbers.
-    pub const ALL: [Self; 7] = [
+    pub const ALL: [Self; 8] = [
         Self::WarmUp,
         Self::Table,
         Self::DroopOutside,
@@ -134,6 +140,7 @@ impl Mode {
         Self::Hold,
         Self::Safe,
         Self::Release,
+        Self::DroopMisfit,
     ];
 }
 

@@ -12,9 +12,9 @@ use crate::table::{CRC_LEN, TableView, checksum};
 use crate::units::STATES;
 
 /// Version of the record that this module writes and reads.
-pub const TELEMETRY_VERSION: u8 = 1;
+pub const TELEMETRY_VERSION: u8 = 2;
 /// Longest record: every varint at its longest.
-const RECORD_MAX: usize = 1 + 5 + 5 + 1 + 1 + STATES * 5 + 6 + 5 + 6 + 3 + 1 + TABLE_ID_LEN;
+const RECORD_MAX: usize = 1 + 5 + 5 + 1 + 1 + STATES * 5 + 6 + 5 + 6 + 3 + 1 + 1 + TABLE_ID_LEN;
 /// Bytes of a [`TableId`] at most: 16 of hash and a varint.
 const TABLE_ID_LEN: usize = 16 + 5;
 /// Longest frame on the line: record, CRC, one byte of COBS (below 254), delimiter.
@@ -78,6 +78,8 @@ pub struct Frame {
     pub set_point: WireSetPoint,
     /// Bits of [`crate::fault::Faults`].
     pub faults: u16,
+    /// Bits of [`crate::charger::Misfits`].
+    pub misfits: u8,
     /// The table, if one was accepted.
     pub table: Option<TableId>,
 }
@@ -101,6 +103,7 @@ impl Frame {
                 Some(SetPoint::Power { w }) => WireSetPoint::PowerW(w),
             },
             faults: report.faults.bits(),
+            misfits: report.misfits.bits(),
             table,
         }
     }
@@ -174,7 +177,7 @@ mod tests {
 
     fn sample() -> Frame {
         Frame {
-            version: 1,
+            version: 2,
             sequence: 1,
             now_ms: 100,
             mode: 1,
@@ -184,6 +187,7 @@ mod tests {
             participation_ppm: 300,
             set_point: WireSetPoint::CurrentMa(6_000),
             faults: 0x81,
+            misfits: 3,
             table: None,
         }
     }
@@ -193,8 +197,8 @@ mod tests {
         // Zigzag varints: -150 000 is 299 999 = 0xDF 0xA7 0x12; 6 000 is 0xF0 0x2E; 300 is 0xAC
         // 0x02; 0x81 is 0x81 0x01.
         let record = [
-            1, 1, 100, 1, 2, 0xDF, 0xA7, 0x12, 0, 2, 1, 1, 4, 0xAC, 0x02, 2, 0xF0, 0x2E, 0x81,
-            0x01, 0,
+            2, 1, 100, 1, 2, 0xDF, 0xA7, 0x12, 0, 2, 1, 1, 4, 0xAC, 0x02, 2, 0xF0, 0x2E, 0x81,
+            0x01, 3, 0,
         ];
         let mut plain = [0; RECORD_MAX];
         let written = postcard::to_slice(&sample(), &mut plain);
@@ -202,11 +206,11 @@ mod tests {
         let crc = checksum(&record).to_le_bytes();
         let mut buffer = [0; FRAME_MAX];
         let line = encode(&sample(), &mut buffer);
-        // COBS by hand: 8 non-zero bytes before the first zero, 11 before the second, then the CRC.
+        // COBS by hand: 8 non-zero bytes before the first zero, 12 before the second, then the CRC.
         let mut expected = std::vec![9];
         expected.extend(&record[..8]);
-        expected.push(12);
-        expected.extend(&record[9..20]);
+        expected.push(13);
+        expected.extend(&record[9..21]);
         expected.push(5);
         expected.extend(crc);
         expected.push(0);
@@ -220,7 +224,7 @@ mod tests {
     #[test]
     fn the_longest_frame_fits() {
         let frame = Frame {
-            version: 1,
+            version: 2,
             sequence: u32::MAX,
             now_ms: u32::MAX,
             mode: 255,
@@ -230,6 +234,7 @@ mod tests {
             participation_ppm: u32::MAX,
             set_point: WireSetPoint::PowerW(i32::MIN),
             faults: u16::MAX,
+            misfits: u8::MAX,
             table: Some(TableId {
                 spec_hash: [255; 16],
                 crc: u32::MAX,
@@ -245,12 +250,12 @@ mod tests {
     fn another_version_is_named() {
         let mut buffer = [0; FRAME_MAX];
         let next = Frame {
-            version: 2,
+            version: 3,
             ..sample()
         };
         let length = encode(&next, &mut buffer).len();
         let found = decode(&mut buffer[..length]);
-        assert_eq!(found, Err(DecodeError::UnsupportedVersion { found: 2 }));
+        assert_eq!(found, Err(DecodeError::UnsupportedVersion { found: 3 }));
     }
 
     proptest! {
@@ -260,7 +265,7 @@ mod tests {
         }
 
         #[test]
-        fn one_flipped_bit_never_passes(at in 0usize..26, bit in 0u8..8) {
+        fn one_flipped_bit_never_passes(at in 0usize..27, bit in 0u8..8) {
             let mut buffer = [0; FRAME_MAX];
             let length = encode(&sample(), &mut buffer).len();
             prop_assume!(at < length - 1);

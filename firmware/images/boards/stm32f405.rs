@@ -65,6 +65,9 @@ const SPI_KHZ: u32 = 1_000;
 /// Time waited from chip select to the first edge, and from the last edge to release \[µs\].
 const SETTLE_US: u32 = 2;
 
+// Two of the longest ticks fit before it bites.
+const _: () = assert!(WATCHDOG_MS >= 2 * firmware::table::TICK_MS_MAX as u32);
+
 /// The board, started.
 pub(crate) struct Started {
     /// What meter and drive are set up on.

@@ -1,6 +1,7 @@
 //! A unidirectional charger: control pilot, contactor and what the car says.
 
 use firmware::board::{Hardware, Rest};
+use firmware::charger::Installation;
 use firmware::dispatch::contactor::ContactorTimes;
 use firmware::dispatch::fleet::Threshold;
 use firmware::dispatch::unidirectional::Unidirectional;
@@ -8,6 +9,10 @@ use firmware::dispatch::{Dispatch, Limits};
 
 /// What socket and cable bear \[mA\].
 const CABLE_MA: u32 = 32_000;
+
+/// What this charger is.
+pub(crate) const INSTALLATION: Installation = Installation::REFERENCE_UNIDIRECTIONAL;
+const _: () = assert!(INSTALLATION.power_w == CABLE_MA / 1000 * 3 * 230);
 
 /// The charger's output; `serial` is its place in the fleet.
 pub(crate) fn on<H: Hardware>(hardware: &mut H, serial: u32) -> Option<impl Dispatch + use<H>> {

@@ -2,6 +2,7 @@
 //! of its own.
 
 use firmware::board::{Hardware, Rest};
+use firmware::charger::Installation;
 use firmware::dispatch::bidirectional::Bidirectional;
 use firmware::dispatch::power_line::PowerLine;
 use firmware::dispatch::{Dispatch, Limits};
@@ -9,6 +10,10 @@ use firmware::dispatch::{Dispatch, Limits};
 /// What the line's 10 % and 90 % stand for, and the power stage's limit in both directions \[W\]:
 /// the paper's swing of 56 kW.
 const SPAN_W: u32 = 28_000;
+
+/// What this charger is.
+pub(crate) const INSTALLATION: Installation = Installation::REFERENCE_BIDIRECTIONAL;
+const _: () = assert!(INSTALLATION.power_w == 2 * SPAN_W);
 
 /// The charger's output. Every charger follows its share, so its place in the fleet does not
 /// matter.

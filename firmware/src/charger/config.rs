@@ -1,5 +1,6 @@
 //! Settings of a charger, and the time until its observer is trusted.
 
+use super::fit::Installation;
 use super::start::StartDelay;
 use crate::event::EventEnd;
 use crate::frequency::gate::GateLimits;
@@ -42,6 +43,9 @@ pub struct ChargerConfig {
     /// By how much this charger's levels of a response are shifted: of its serial number, so that a
     /// fleet does not step together.
     pub level_offset: LevelOffset,
+    /// What this charger is, to be compared with what the proof of its table assumed. `None` in
+    /// experiments and simulations: nothing is compared.
+    pub installation: Option<Installation>,
     /// When an event is over, and how long the way back takes.
     pub event_end: EventEnd,
     /// How long nothing is energised after a start, once the mains has been seen.
@@ -50,7 +54,7 @@ pub struct ChargerConfig {
 
 impl ChargerConfig {
     /// No filter, 1 s of hold at 100 ms a tick, release over 60 s, warm-up by the plant, levels as
-    /// they are, [`EventEnd::DEFAULT`], no delay at the start.
+    /// they are, nothing compared, [`EventEnd::DEFAULT`], no delay at the start.
     pub const DEFAULT: Self = Self {
         gate: GateLimits::DEFAULT,
         filter_ticks: 1,
@@ -58,6 +62,7 @@ impl ChargerConfig {
         release_ppm: 1_667,
         warm_up_ticks: None,
         level_offset: LevelOffset::NONE,
+        installation: None,
         event_end: EventEnd::DEFAULT,
         start_delay: StartDelay::NONE,
     };

@@ -1,5 +1,6 @@
 //! What a tick did, and its log lines.
 
+use super::fit::Misfits;
 use crate::dispatch::SetPoint;
 use crate::fault::{Faults, Mode};
 use crate::phase::Phase;
@@ -26,6 +27,8 @@ pub struct Report {
     pub set_point: Option<SetPoint>,
     /// What was wrong.
     pub faults: Faults,
+    /// What the proof of the table assumed otherwise.
+    pub misfits: Misfits,
 }
 
 /// What stands until a tick changes it.
@@ -62,6 +65,8 @@ pub(super) struct ChangeLog {
     mode: Mode,
     #[cfg(feature = "defmt")]
     faults: Faults,
+    #[cfg(feature = "defmt")]
+    misfits: Misfits,
 }
 
 impl ChangeLog {
@@ -71,6 +76,8 @@ impl ChangeLog {
         mode: Standing::FIRST.mode,
         #[cfg(feature = "defmt")]
         faults: Faults::NONE,
+        #[cfg(feature = "defmt")]
+        misfits: Misfits::NONE,
     };
 
     /// Logs what is new in a report.
@@ -93,6 +100,19 @@ impl ChangeLog {
                 defmt::info!("tick {=u32}: cleared {=str}", now.sequence, name);
             }
         }
+        // Found when the charger starts; they stay.
+        if now.misfits != self.misfits {
+            for (misfit, name) in Misfits::NAMES {
+                if now.misfits.contains(misfit) {
+                    defmt::warn!(
+                        "tick {=u32}: not as the table assumes: {=str}",
+                        now.sequence,
+                        name
+                    );
+                }
+            }
+        }
+        self.misfits = now.misfits;
         self.mode = now.mode;
         self.faults = now.faults;
     }

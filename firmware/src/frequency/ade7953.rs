@@ -55,6 +55,8 @@ pub const I2C_ADDRESS: u8 = 0x38;
 pub const PERIOD_CLOCK_HZ: u32 = 223_750;
 /// Counts in a nominal period, `PERIOD + 1`.
 const NOMINAL_COUNTS: u32 = PERIOD_CLOCK_HZ / NOMINAL_HZ;
+/// Bound on a reading's error \[µHz\]: one count of 4475 at 50 Hz, rounded up.
+pub const ERROR_UHZ: u32 = NOMINAL_HZ * MICRO as u32 / NOMINAL_COUNTS + 1;
 /// Readings in a row that may be equal \[ticks\]. On 9 August 2019 PERIOD would have stood still
 /// for 18 s at most.
 const STUCK_TICKS: u16 = 600;
@@ -63,6 +65,9 @@ const STUCK_TICKS: u16 = 600;
 const SAMPLES: usize = 5;
 /// Time between two samples: a nominal period \[ms\].
 const SAMPLE_MS: u32 = 1000 / NOMINAL_HZ;
+/// Delay of a reading \[ms\]. PERIOD is the last whole mains period: half of it. The median of a
+/// ramp is its middle.
+pub const LAG_MS: u16 = (SAMPLE_MS / 2 + SAMPLE_MS * (SAMPLES as u32 / 2)) as u16;
 
 const _: () = assert!(NOMINAL_COUNTS == 4475);
 
@@ -274,13 +279,11 @@ impl<R: Registers> Ade7953<R> {
 
 impl<R: Registers> FrequencySource for Ade7953<R> {
     fn error_uhz(&self) -> u32 {
-        // One count of 4475 at 50 Hz, rounded up.
-        NOMINAL_HZ * MICRO as u32 / NOMINAL_COUNTS + 1
+        ERROR_UHZ
     }
 
     fn lag_ms(&self) -> u16 {
-        // PERIOD is the last whole mains period: half of it. The median of a ramp is its middle.
-        (SAMPLE_MS / 2 + SAMPLE_MS * (SAMPLES as u32 / 2)) as u16
+        LAG_MS
     }
 
     fn stuck_after(&self) -> Option<NonZeroU16> {

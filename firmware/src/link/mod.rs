@@ -12,7 +12,7 @@ use crate::telemetry::{Frame, TableId};
 use crate::units::STATES;
 
 /// Version of the requests and responses.
-pub const LINK_VERSION: u8 = 1;
+pub const LINK_VERSION: u8 = 2;
 /// Bytes of the length in front of a record.
 pub const LENGTH_LEN: usize = 2;
 /// Longest record.

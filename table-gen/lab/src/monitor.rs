@@ -6,6 +6,7 @@
 use std::fmt::Write as _;
 use std::io::{self, Read, Write};
 
+use firmware::charger::Misfits;
 use firmware::fault::{Faults, Mode};
 use firmware::phase::Phase;
 use firmware::telemetry::{DecodeError, FRAME_MAX, Frame, WireSetPoint, decode};
@@ -77,6 +78,7 @@ fn mode_name(mode: u8) -> &'static str {
         Some(Mode::Hold) => "hold",
         Some(Mode::Safe) => "safe",
         Some(Mode::Release) => "release",
+        Some(Mode::DroopMisfit) => "droop, misfit",
         None => "?",
     }
 }
@@ -90,14 +92,18 @@ fn set_point(set_point: WireSetPoint) -> String {
     }
 }
 
-/// The names of a frame's faults, `-` for none.
-pub fn fault_names(bits: u16) -> String {
-    let faults = Faults::from_bits(bits);
-    let names: Vec<&str> = Faults::NAMES
+/// The names of a frame's faults, each misfit among them, `-` for none.
+pub fn fault_names(frame: &Frame) -> String {
+    let faults = Faults::from_bits(frame.faults);
+    let mut names: Vec<&str> = Faults::NAMES
         .iter()
         .filter(|(fault, _)| faults.contains(*fault))
         .map(|(_, name)| *name)
         .collect();
+    let misfits = Misfits::NAMES
+        .iter()
+        .filter(|(misfit, _)| frame.misfits & misfit.bits() != 0);
+    names.extend(misfits.map(|(_, name)| *name));
     if names.is_empty() {
         "-".into()
     } else {
@@ -125,7 +131,7 @@ pub fn line(frame: &Frame) -> String {
         set_point(frame.set_point),
         phase_name(frame.phase),
         mode_name(frame.mode),
-        fault_names(frame.faults),
+        fault_names(frame),
     );
     text
 }
@@ -192,12 +198,12 @@ pub fn watch(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use firmware::telemetry::encode;
+    use firmware::telemetry::{TELEMETRY_VERSION, encode};
     use proptest::prelude::*;
 
     fn frame(sequence: u32, faults: u16) -> Frame {
         Frame {
-            version: 1,
+            version: TELEMETRY_VERSION,
             sequence,
             now_ms: sequence * 100,
             mode: 1,
@@ -207,6 +213,7 @@ mod tests {
             participation_ppm: 350_000,
             set_point: WireSetPoint::CurrentMa(20_800),
             faults,
+            misfits: 0,
             table: None,
         }
     }
