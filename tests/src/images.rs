@@ -13,6 +13,8 @@ use crate::root;
 
 /// Target of the images: the reference board's Cortex-M4F.
 pub const TARGET: &str = "thumbv7em-none-eabihf";
+/// Names a table for the image, to the build script.
+pub const TABLE_VARIABLE: &str = "HOLDFAST_TABLE";
 /// Symbol of the TABLE region's first byte, from the memory map.
 const TABLE_START: &str = "__table_start";
 /// Bytes of a record of Intel HEX.
@@ -36,6 +38,12 @@ impl Image {
             features,
             log: false,
         }
+    }
+
+    /// Whether it is built with a feature.
+    #[must_use]
+    pub fn has(&self, feature: &str) -> bool {
+        self.features.split(',').any(|name| name == feature)
     }
 
     /// An image of the product with log lines.
@@ -107,7 +115,20 @@ fn cargo() -> OsString {
 /// # Errors
 /// Cargo is not there, or does not build it.
 pub fn build(image: Image, target: &str) -> Result<PathBuf, ImageError> {
-    let output = Command::new(cargo())
+    build_with(image, target, None)
+}
+
+/// The same with a table of one's own, at an absolute path.
+///
+/// # Errors
+/// As [`build`].
+pub fn build_with(image: Image, target: &str, table: Option<&Path>) -> Result<PathBuf, ImageError> {
+    let mut command = Command::new(cargo());
+    match table {
+        Some(path) => command.env(TABLE_VARIABLE, path),
+        None => command.env_remove(TABLE_VARIABLE),
+    };
+    let output = command
         .args(["build", "--package", "firmware", "--profile", "firmware"])
         .args(["--target", target, "--bin", image.binary])
         .args(["--features", image.features])

@@ -16,16 +16,17 @@ use model::spec::Spec;
 use synth::game::Unwatched;
 use synth::pipeline;
 use tests::costs::{self, CostError};
-use tests::images::{self, Elf, PIL, PRODUCTS};
+use tests::images::{self, Elf, Image, PIL, PRODUCTS};
 use tests::pil::machine::{self, Machine};
 use tests::pil::qemu::Target;
 use tests::pil::run::{Outcome, Pair, closed_loop, recorded};
 use tests::pil::scenario::{self, Scenario};
+use tests::table_fit::{self, Candidate, Product};
 use tests::{root, stand_in};
 
 /// The recorded day, beside the repository.
 const RECORDED: &str = "../shared/data/gb-frequency-2019-08-09.csv";
-/// The table that the images carry.
+/// The table of processor-in-the-loop runs and measurements: a table by games.
 const TABLE: &str = "firmware/tables/paper-bi.bin";
 
 /// Most random scenarios with commands that act late.
@@ -49,6 +50,14 @@ enum Command {
         /// Build the product's images with log lines over the debug probe
         #[arg(long)]
         log: bool,
+        #[command(flatten)]
+        choice: Choice,
+    },
+    /// Say which table goes into which image, whether it fits and what is proven of it; build
+    /// nothing
+    Check {
+        #[command(flatten)]
+        choice: Choice,
     },
     /// Processor in the loop: the pil image in QEMU against the same code on the host, compared to
     /// the bit
@@ -72,6 +81,20 @@ enum Command {
         #[arg(long)]
         bless: bool,
     },
+}
+
+/// Tables and products.
+#[derive(Debug, Default, clap::Args)]
+struct Choice {
+    /// Table for the images, in place of the shipped one for each product; also HOLDFAST_TABLE=FILE
+    #[arg(long, value_name = "FILE")]
+    table: Option<PathBuf>,
+    /// One product alone, by the name of its image
+    #[arg(long, value_name = "NAME")]
+    product: Option<String>,
+    /// Take a table that does not fit, for an experiment: the charger says so and runs the droop
+    #[arg(long)]
+    force: bool,
 }
 
 /// The cores that the pil image runs on.
@@ -101,9 +124,11 @@ fn main() -> ExitCode {
     let command = Cli::parse().command.unwrap_or(Command::Images {
         out: "out/firmware".into(),
         log: false,
+        choice: Choice::default(),
     });
     let result = match command {
-        Command::Images { out, log } => build_images(&out, log),
+        Command::Images { out, log, choice } => build_images(&out, log, &choice),
+        Command::Check { choice } => plan(&choice).map(drop),
         Command::Pil {
             scenarios,
             ticks,
@@ -126,10 +151,91 @@ fn main() -> ExitCode {
     }
 }
 
-fn build_images(out: &Path, log: bool) -> Result<(), AnyError> {
-    let products = PRODUCTS.map(|image| if log { image.with_log() } else { image });
-    for image in products.into_iter().chain([PIL]) {
-        let elf = Elf::read(&images::build(image, images::TARGET)?)?;
+/// Which image is built with which table; `None` for the shipped one. Said before anything is
+/// built.
+///
+/// A table that was named goes into the products that it fits. A product that was named must fit.
+fn plan(choice: &Choice) -> Result<Vec<(Image, Option<PathBuf>)>, AnyError> {
+    let variable = std::env::var_os(images::TABLE_VARIABLE).map(PathBuf::from);
+    // Relative to where the command was started, whatever folder cargo builds in.
+    let named = match choice.table.clone().or(variable) {
+        Some(path) if path.as_os_str().is_empty() => Some(path),
+        Some(path) => Some(std::path::absolute(path)?),
+        None => None,
+    };
+    let candidate = named.as_deref().map(Candidate::read).transpose()?;
+    if let Some(candidate) = &candidate {
+        println!("{}", candidate.describe());
+    }
+    let mut chosen = Vec::new();
+    let mut refused = Vec::new();
+    let mut known = false;
+    for product in Product::all()? {
+        let name = product.image.name;
+        if choice.product.as_ref().is_some_and(|wanted| wanted != name) {
+            continue;
+        }
+        known = true;
+        let shipped;
+        let table = match &candidate {
+            Some(candidate) => candidate,
+            None => {
+                let path = product.default_table();
+                if !path.exists() {
+                    println!(
+                        "{name}: NO TABLE, for {} is missing: the charger runs on the droop",
+                        path.display()
+                    );
+                    chosen.push((product.image, None));
+                    continue;
+                }
+                shipped = Candidate::read(&path)?;
+                println!("{}", shipped.describe());
+                &shipped
+            }
+        };
+        let misfits = table.misfits(&product)?;
+        if misfits.is_empty() {
+            println!("{name}: the table fits");
+        } else if candidate.is_none() {
+            println!(
+                "{name}: DOES NOT FIT its shipped table ({}): the charger says so and runs on the droop",
+                table_fit::names(misfits)
+            );
+        } else if choice.force {
+            println!(
+                "{name}: DOES NOT FIT ({}), FORCED: the charger says so and runs on the droop",
+                table_fit::names(misfits)
+            );
+        } else {
+            let reason = format!("{name}: {}", table_fit::names(misfits));
+            println!("{reason}: not built");
+            refused.push(reason);
+            continue;
+        }
+        chosen.push((product.image, named.clone()));
+    }
+    if !known {
+        let names = PRODUCTS.map(|image| image.name).join(", ");
+        return Err(format!("no such product; allowed: {names}").into());
+    }
+    if chosen.is_empty() {
+        let reasons = refused.join("; ");
+        return Err(format!("the table does not fit: {reasons}; --force for an experiment").into());
+    }
+    Ok(chosen)
+}
+
+fn build_images(out: &Path, log: bool, choice: &Choice) -> Result<(), AnyError> {
+    let products = plan(choice)?
+        .into_iter()
+        .map(|(image, table)| (if log { image.with_log() } else { image }, table));
+    for (image, table) in products.chain([(PIL, None)]) {
+        let elf = Elf::read(&images::build_with(
+            image,
+            images::TARGET,
+            table.as_deref(),
+        )?)?;
         println!("{}", image.name);
         for section in elf.sections()? {
             let place = match (section.in_flash, section.in_ram) {
@@ -284,7 +390,7 @@ fn replay(pair: &mut Pair<'_, '_>) -> Result<(), AnyError> {
 }
 
 fn tell(what: &str, outcome: &Outcome) {
-    let [warm_up, table, outside, none, hold, safe, release] = outcome.modes;
+    let [warm_up, table, outside, none, hold, safe, release, _misfit] = outcome.modes;
     println!(
         "{what}: lowest {:.3} Hz, participation up to {:.3}, faults {:#06x}; ticks: {warm_up} warm-up, \
          {table} table, {outside} outside, {none} no table, {hold} hold, {safe} safe, {release} release",
