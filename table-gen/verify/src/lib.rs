@@ -49,7 +49,7 @@ mod timed;
 mod watching;
 mod zonotope;
 
-use model::verdict::{ClaimName, Counterexample, Counts, Method, Verdict};
+use model::verdict::{Claim, ClaimName, Counterexample, Counts, Method, Verdict};
 
 use firmware::table::{TableError, TableView};
 use sha2::{Digest, Sha256};
@@ -183,6 +183,16 @@ pub fn verify(
         tool_version: env!("CARGO_PKG_VERSION").to_owned(),
         failures,
     })
+}
+
+/// The claim that a table is the one that the spec asks for and that the device can use it, alone:
+/// nothing is explored. A verdict is not "verified" where it fails.
+///
+/// # Errors
+/// A table that the firmware rejects.
+pub fn header_claim(bytes: &[u8], spec: &Spec) -> Result<Claim, VerifyError> {
+    let table = TableView::parse(bytes).map_err(VerifyError::Table)?;
+    Ok(claims::header(&table, spec))
 }
 
 /// The verdict on a response, or on a table for a spec that asks for one.
