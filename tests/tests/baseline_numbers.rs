@@ -51,8 +51,9 @@ fn a_loss_of_two_gigawatts() {
             Some(breached),
             "{name} {respond}"
         );
-        // The oracle's times come from samples 0.02 s apart (all of them are multiples of it). Its nadir may be one
-        // sample off; its time below a limit, counted from first to last sample, misses up to one sample at either end.
+        // The oracle's times come from samples 0.02 s apart (all of them are multiples of it). Its
+        // nadir may be one sample off; its time below a limit, counted from first to last sample,
+        // misses up to one sample at either end.
         assert!(
             (summary.nadir_time_s - at).abs() <= 0.02,
             "{name} {respond}: {}",
@@ -74,7 +75,8 @@ fn steady_state_for_every_dead_band() {
             let deadband = 0.05 * f64::from(step);
             let spec = spec(name, deadband);
             let run = baseline::simulate(&spec, &Scenario::of(&spec), true);
-            // At rest p = K f, so 6 f = P u - 2 with u = (-f - deadband) / 0.5; without a response f = -1/3.
+            // At rest p = K f, so 6 f = P u - 2 with u = (-f - deadband) / 0.5; without a response
+            // f = -1/3.
             let rest = if deadband < 1.0 / 3.0 {
                 50.0 - (2.0 + 2.0 * fleet * deadband) / (6.0 + 2.0 * fleet)
             } else {

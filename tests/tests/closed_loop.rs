@@ -9,20 +9,12 @@ use firmware::units::State;
 use lab::simulation::closed_loop::{self, Estimator};
 use lab::simulation::scenario::Scenario;
 use model::spec::Spec;
-use synth::game::{Unwatched, Watch};
-use synth::pipeline;
-
-fn table(name: &str, set: &[String]) -> (Spec, Vec<u8>) {
-    let spec = Spec::load(name, set).unwrap();
-    let watch = |_| Box::new(Unwatched) as Box<dyn Watch>;
-    let bytes = pipeline::table_bytes(&spec, None, &watch).unwrap();
-    (spec, bytes)
-}
+use tests::testing::{built, load, shipped};
 
 #[test]
 fn the_papers_event_is_contained_and_settles() {
     for name in ["paper-bi", "paper-uni"] {
-        let (spec, bytes) = table(name, &[]);
+        let (spec, bytes) = (load(name, &[]), shipped(name));
         let view = TableView::parse_for_spec(&bytes, spec.hash()).unwrap();
         for estimator in [Estimator::FullState, Estimator::Observer] {
             let run = closed_loop::simulate(&spec, &view, &Scenario::of(&spec), estimator).unwrap();
@@ -39,7 +31,8 @@ fn the_papers_event_is_contained_and_settles() {
                 "{name} {estimator:?}: {outer} {inner}"
             );
             let names: Vec<_> = run.phases.iter().map(|span| span.phase).collect();
-            // Each phase comes first in the paper's order; C1 may take over again where f leaves I1 once more.
+            // Each phase comes first in the paper's order; C1 may take over again where f leaves I1
+            // once more.
             let mut firsts: Vec<&str> = Vec::new();
             for phase in &names {
                 if !firsts.contains(phase) {
@@ -66,8 +59,7 @@ fn small() -> (Spec, Vec<u8>) {
         "requirements.inner_hz=[-0.2, 0.0]",
         "method.successor=exact-linear",
     ];
-    let set: Vec<String> = set.iter().map(|s| (*s).to_owned()).collect();
-    table("paper-bi", &set)
+    built("paper-bi", &set)
 }
 
 #[test]
@@ -115,7 +107,7 @@ fn any_damage_is_rejected_and_the_droop_takes_over() {
 #[test]
 fn a_foreign_table_is_named() {
     let (spec, bytes) = small();
-    let other = Spec::load("paper-uni", &[]).unwrap();
+    let other = load("paper-uni", &[]);
     let error = TableView::parse_for_spec(&bytes, other.hash()).unwrap_err();
     assert_eq!(
         error,
@@ -130,7 +122,8 @@ fn a_foreign_table_is_named() {
 fn a_state_outside_the_table_is_answered_by_the_droop() {
     let (_, bytes) = small();
     let mut firmware = ControlLoop::new(&bytes);
-    // Far below the grid: no law, so the droop saturates; back inside a law's domain the table takes over again.
+    // Far below the grid: no law, so the droop saturates; back inside a law's domain the table
+    // takes over again.
     let action = firmware.step(State([-3_000_000, 0, 0, 0]));
     assert_eq!(
         (action.source, action.participation.ppm()),

@@ -10,19 +10,9 @@ use firmware::table::{Law, TableView};
 use model::spec::Spec;
 use synth::compress::{self, CompressedLaws, Options, recheck};
 use synth::emit::{self, dense};
-use synth::game::{NOT_WON, Unwatched, Watch};
+use synth::game::{NOT_WON, unwatched};
 use synth::synthesis::{self, Synthesis};
-
-fn unwatched(_: &'static str) -> Box<dyn Watch> {
-    Box::new(Unwatched)
-}
-
-fn synthesise(overrides: &[&str]) -> (Spec, Synthesis) {
-    let overrides: Vec<String> = overrides.iter().map(|s| (*s).to_owned()).collect();
-    let spec = Spec::load("paper-bi", &overrides).unwrap();
-    let synthesis = synthesis::synthesise(&spec, &unwatched).unwrap();
-    (spec, synthesis)
-}
+use tests::testing::{on_threads, synthesised};
 
 fn table(spec: &Spec, synthesis: &Synthesis, exact_domain: bool) -> (Vec<u8>, CompressedLaws) {
     let options = Options {
@@ -42,7 +32,7 @@ fn solved(synthesis: &Synthesis, law: Law) -> &synthesis::SolvedLaw {
 
 #[test]
 fn the_reachable_table_is_tiny_sound_and_verified() {
-    let (spec, synthesis) = synthesise(&["table.domain=reachable"]);
+    let (spec, synthesis) = synthesised("paper-bi", &["table.domain=reachable"]);
     let (bytes, laws) = table(&spec, &synthesis, false);
     let parts: u32 = laws
         .laws
@@ -64,11 +54,7 @@ fn the_reachable_table_is_tiny_sound_and_verified() {
     let verdict = verify::verify(&bytes, &spec, &|_| true).unwrap();
     assert!(verdict.verified);
     // One thread gives the same bytes as all.
-    let pool = rayon::ThreadPoolBuilder::new()
-        .num_threads(1)
-        .build()
-        .unwrap();
-    let (alone, _) = pool.install(|| {
+    let (alone, _) = on_threads(1, || {
         let synthesis = synthesis::synthesise(&spec, &unwatched).unwrap();
         table(&spec, &synthesis, false)
     });
@@ -77,7 +63,7 @@ fn the_reachable_table_is_tiny_sound_and_verified() {
 
 #[test]
 fn the_exact_table_answers_every_winning_cell_and_still_wins() {
-    let (spec, synthesis) = synthesise(&[]);
+    let (spec, synthesis) = synthesised("paper-bi", &[]);
     let (bytes, laws) = table(&spec, &synthesis, true);
     let inputs: u32 = laws
         .laws
@@ -128,7 +114,7 @@ fn the_exact_table_answers_every_winning_cell_and_still_wins() {
 
 #[test]
 fn one_cell_in_a_hundred_buys_a_table_of_two_kilobytes() {
-    let (spec, synthesis) = synthesise(&[]);
+    let (spec, synthesis) = synthesised("paper-bi", &[]);
     let (bytes, laws) = table(&spec, &synthesis, false);
     // Goals: 10 KB, membership included, and 32 visits; 2,152 bytes and 21 visits were measured.
     assert!(bytes.len() <= 4096, "{} bytes", bytes.len());

@@ -15,11 +15,7 @@ use model::propagator::Propagator;
 use model::spec::Spec;
 use synth::emit::{self, EncodedLaw};
 use synth::synthesis;
-
-fn load(name: &str, set: &[&str]) -> Spec {
-    let set: Vec<String> = set.iter().map(|s| (*s).to_owned()).collect();
-    Spec::load(name, &set).unwrap()
-}
+use tests::testing::load;
 
 /// A table that answers the trigger, and every state of the grid after it, with one level.
 fn always(spec: &Spec, level: u8) -> Vec<u8> {
@@ -57,7 +53,8 @@ const COARSE: [&str; 6] = [
     "sampling.period_s=1",
 ];
 
-/// Nadirs \[Hz\] of full response from the moment at which f leaves I1, by delay; from independent programs.
+/// Nadirs \[Hz\] of full response from the moment at which f leaves I1, by delay; from independent
+/// programs.
 const NADIRS: [(&str, [(f64, f64); 5]); 2] = [
     (
         "paper-uni",
@@ -150,7 +147,8 @@ fn the_device_predicts_what_the_grid_becomes() {
         bytes[HEADER_LEN..].len() as u32 - table.header().laws[2].unwrap().inputs_len,
         244
     );
-    // A fall with commands under way: the loop's own memory must be what a prediction from outside would use.
+    // A fall with commands under way: the loop's own memory must be what a prediction from outside
+    // would use.
     let plant = GridPlant::new(&spec);
     let step = Propagator::new(&plant, 0.1);
     let mut control = ControlLoop::new(&bytes);
@@ -174,7 +172,8 @@ fn the_device_predicts_what_the_grid_becomes() {
         let acting = under_way.pop_front().unwrap();
         x = step.step(&x, plant.fleet * acting - 2.0);
     }
-    // The loss is the expected one: ten ticks later the state is the predicted one, but for the floors of f, g, l, p and ρ.
+    // The loss is the expected one: ten ticks later the state is the predicted one, but for the
+    // floors of f, g, l, p and ρ.
     for (then, now) in predicted.iter().zip(&states[10..]) {
         for axis in 0..4 {
             assert!((then.0[axis] - now.0[axis]).abs() <= 10, "{then:?} {now:?}");

@@ -1,4 +1,5 @@
-//! The engine against a slow solver on random small plants, grids and targets, and on any number of threads.
+//! The engine against a slow solver on random small plants, grids and targets, and on any number of
+//! threads.
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on fails")]
 
 use model::grid_shape::GridShape;
@@ -10,12 +11,15 @@ use synth::game::bitset::BitSet;
 use synth::game::guard::Unguarded;
 use synth::game::reach::reach;
 use synth::game::safety::safety;
-use synth::game::{NOT_WON, Unwatched};
+use synth::game::{NOT_WON, Unwatched, unwatched};
+use synth::synthesis;
 use tests::reference::SlowGame;
+use tests::testing::{load, on_threads};
 
 const D: usize = 3;
 
-/// A random plant: stable or not quite, unstable, or singular (a row of zeros: a pure integrator of the drive).
+/// A random plant: stable or not quite, unstable, or singular (a row of zeros: a pure integrator of
+/// the drive).
 fn plants() -> impl Strategy<Value = DMatrix<f64>> {
     let entries = proptest::collection::vec(-0.6f64..0.6, D * D);
     let shift = prop_oneof![2 => Just(-0.5), 1 => Just(0.0), 1 => Just(0.6)];
@@ -151,14 +155,11 @@ proptest! {
 
 #[test]
 fn the_answer_does_not_depend_on_the_number_of_threads() {
-    use model::spec::Spec;
-    let spec = Spec::load("paper-bi", &[]).unwrap();
+    let spec = load("paper-bi", &[]);
     let solve = |threads| {
-        let pool = rayon::ThreadPoolBuilder::new()
-            .num_threads(threads)
-            .build()
-            .unwrap();
-        pool.install(|| synth::synthesis::synthesise(&spec, &|_| Box::new(Unwatched)).unwrap())
+        on_threads(threads, || {
+            synthesis::synthesise(&spec, &unwatched).unwrap()
+        })
     };
     let one = solve(1);
     for threads in [2, 8] {

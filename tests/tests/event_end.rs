@@ -1,4 +1,5 @@
-//! The end of an event, in closed loop with the grid: the charger's own code over the shipped tables.
+//! The end of an event, in closed loop with the grid: the charger's own code over the shipped
+//! tables.
 #![allow(
     clippy::unwrap_used,
     clippy::panic,
@@ -14,11 +15,11 @@ use firmware::phase::{Decision, Phase, PhaseState};
 use firmware::prediction::History;
 use firmware::table::TableView;
 use firmware::units::State;
+use model::plant::GridPlant;
 use model::propagator::Propagator;
-use model::spec::Spec;
 use synth::delay::Delay;
-use tests::pil::run::plant;
-use tests::{root, stand_in};
+use tests::stand_in;
+use tests::testing::{load, shipped};
 
 const TICK_S: f64 = 0.1;
 const FLEET_GW: f64 = 1.4;
@@ -34,10 +35,6 @@ struct Tick {
     mode: Mode,
     phase: u8,
     state: State,
-}
-
-fn shipped(table: &str) -> Vec<u8> {
-    std::fs::read(root().join("firmware/tables").join(table)).unwrap()
 }
 
 /// A loss over time \[GW\] against a bidirectional fleet with this shipped table.
@@ -63,7 +60,9 @@ fn run_late(
         brown_out: false,
     };
     assert_eq!(session.handle(&Request::Start(setup)), Response::Done);
-    let grid = Propagator::new(&plant(FLEET_GW), TICK_S);
+    let plant = GridPlant::new(&load("paper-bi", &[]));
+    assert_eq!(plant.fleet, FLEET_GW);
+    let grid = Propagator::new(&plant, TICK_S);
     let mut x = [0.0_f64; 4];
     let mut under_way = VecDeque::from(vec![0.0; delay_ticks]);
     (0..(until_s / TICK_S) as u32)
@@ -110,13 +109,14 @@ fn falls(ticks: &[Tick], most_ppm: u32) {
 #[test]
 fn reserves_replace_the_loss_and_charging_resumes() {
     let loss = |s: f64| (2.0 * (1.0 - (s - 200.0) / 300.0)).clamp(0.0, 2.0);
-    for table in ["paper-bi.bin", "gb-bi-band.bin"] {
+    for table in ["paper-bi", "gb-bi-band"] {
         let ticks = run(table, 1800.0, loss);
         let at = first_release(&ticks);
         let after = &ticks[at..];
         assert!(ticks[..at].iter().any(|tick| tick.share_ppm > 0), "{table}");
         falls(after, 1_670);
-        // The demand comes back no faster than a fleet in one minute: f stays inside I1's lower end.
+        // The demand comes back no faster than a fleet in one minute: f stays inside I1's lower
+        // end.
         let lowest = after.iter().map(|tick| tick.f_hz).fold(0.0, f64::min);
         assert!(lowest > OUTER_LOW_HZ, "{table}: {lowest}");
         let last = ticks.last().unwrap();
@@ -127,7 +127,7 @@ fn reserves_replace_the_loss_and_charging_resumes() {
 #[test]
 fn a_generator_that_comes_back_at_once_does_not_make_the_fleet_hunt() {
     let loss = |s: f64| if s < 200.0 { 2.0 } else { 0.0 };
-    for table in ["paper-bi.bin", "gb-bi-band.bin"] {
+    for table in ["paper-bi", "gb-bi-band"] {
         let ticks = run(table, 1800.0, loss);
         let at = first_release(&ticks);
         falls(&ticks[at..], 1_670);
@@ -137,27 +137,30 @@ fn a_generator_that_comes_back_at_once_does_not_make_the_fleet_hunt() {
     }
 }
 
-/// Hold gives no more than it must, so f stays below 49.9 Hz and the event lasts: the proof's "for ever" is not cut short.
+/// Hold gives no more than it must, so f stays below 49.9 Hz and the event lasts: the proof's "for
+/// ever" is not cut short.
 #[test]
 fn an_event_whose_loss_nobody_replaces_does_not_end() {
-    let ticks = run("gb-bi-band.bin", 3600.0, |_| 2.0);
+    let ticks = run("gb-bi-band", 3600.0, |_| 2.0);
     assert!(ticks.iter().all(|tick| tick.mode == Mode::Table));
     assert!(ticks.last().unwrap().share_ppm > 0);
 }
 
-/// More than half of the loss is replaced, and what Fixed still holds brings f above 49.9 Hz, or above I1.
+/// More than half of the loss is replaced, and what Fixed still holds brings f above 49.9 Hz, or
+/// above I1.
 #[test]
 fn a_release_that_comes_too_early_stands_still_above_i1() {
     for rest_gw in [0.8, 0.85, 0.9] {
         let loss = |s: f64| if s < 200.0 { 2.0 } else { rest_gw };
-        let ticks = run("paper-bi.bin", 3600.0, loss);
+        let ticks = run("paper-bi", 3600.0, loss);
         let after = &ticks[first_release(&ticks)..];
         falls(after, 1_670);
         // Never below I1, where the event would begin anew: the release just stands still.
         assert!(after.iter().all(|tick| tick.mode == Mode::Release));
         assert!(after.iter().all(|tick| tick.f_hz > OUTER_LOW_HZ));
-        // At rest f = (1.4 u - w) / 6: a tick of release moves it by 1.4 * 167e-6 / 6 = 0.04 mHz, and the last ones before
-        // it stood still may not have come through yet: 25 of them are allowed, 2.5 s.
+        // At rest f = (1.4 u - w) / 6: a tick of release moves it by 1.4 * 167e-6 / 6 = 0.04 mHz,
+        // and the last ones before it stood still may not have come through yet: 25 of them are
+        // allowed, 2.5 s.
         let last = ticks.last().unwrap();
         assert!((last.f_hz + 0.1).abs() < 1e-3, "{rest_gw}: {last:?}");
         let rest = (FLEET_GW * f64::from(last.share_ppm) * 1e-6 - rest_gw) / 6.0;
@@ -172,7 +175,7 @@ fn the_next_loss_during_a_release_is_answered() {
         s if s < 400.0 => 0.0,
         _ => 2.0,
     };
-    for table in ["paper-bi.bin", "gb-bi-band.bin"] {
+    for table in ["paper-bi", "gb-bi-band"] {
         let ticks = run(table, 520.0, loss);
         let second = ticks.iter().filter(|tick| tick.s >= 400.0);
         let below = second
@@ -187,7 +190,8 @@ fn the_next_loss_during_a_release_is_answered() {
     }
 }
 
-/// The commands that the charger gave are all that is under way, whoever decided them: from them alone follows every decision.
+/// The commands that the charger gave are all that is under way, whoever decided them: from them
+/// alone follows every decision.
 #[test]
 fn the_next_loss_within_the_delay_is_decided_on_what_is_under_way() {
     let (mut anew, mut forgetful) = (0, 0);
@@ -196,9 +200,9 @@ fn the_next_loss_within_the_delay_is_decided_on_what_is_under_way() {
             "uncertainty.actuation_delay_s={}",
             delay_ticks as f64 * TICK_S
         );
-        let spec = Spec::load("paper-bi", &[set]).unwrap();
+        let spec = load("paper-bi", &[&set]);
         let delay = Delay::of(&spec).unwrap().unwrap();
-        let bytes = stand_in::late(&shipped("paper-bi.bin"), &delay).unwrap();
+        let bytes = stand_in::late(&shipped("paper-bi"), &delay).unwrap();
         let table = TableView::parse(&bytes).unwrap();
         // Every second loss comes while the fleet is released from the first.
         for (second_s, second_gw) in [(225.0, 1.5), (260.0, 2.0), (300.0, 1.0), (380.0, 2.0)] {
@@ -218,8 +222,9 @@ fn the_next_loss_within_the_delay_is_decided_on_what_is_under_way() {
     assert!(anew > 0 && forgetful > 0, "{anew} {forgetful}");
 }
 
-/// Holds every decision of a run against the phase machine on what follows from the commands so far. How many events began during a
-/// release, and for how many the decision would have been another had the commands under way been forgotten.
+/// Holds every decision of a run against the phase machine on what follows from the commands so
+/// far. How many events began during a release, and for how many the decision would have been
+/// another had the commands under way been forgotten.
 fn follow(table: &TableView<'_>, ticks: &[Tick]) -> (u32, u32) {
     let prediction = table.prediction().unwrap();
     let step_ppm = table.header().input_step_ppm;
@@ -227,7 +232,8 @@ fn follow(table: &TableView<'_>, ticks: &[Tick]) -> (u32, u32) {
     let (mut anew, mut forgetful) = (0, 0);
     for pair in ticks.windows(2) {
         let (before, now) = (&pair[0], &pair[1]);
-        // What droop and release command are whole levels too, or the prediction would not know them.
+        // What droop and release command are whole levels too, or the prediction would not know
+        // them.
         assert_eq!(before.share_ppm % step_ppm, 0, "{before:?}");
         history.push((before.share_ppm / step_ppm) as u8);
         if now.mode == Mode::Release {

@@ -1,4 +1,5 @@
-//! Who may depend on whom: the compiler keeps the verifier independent, as long as its manifest does not change.
+//! Who may depend on whom: the compiler keeps the verifier independent, as long as its manifest
+//! does not change.
 #![allow(clippy::expect_used, reason = "a test that cannot go on fails")]
 
 use std::collections::{BTreeMap, BTreeSet};
@@ -6,7 +7,8 @@ use std::process::Command;
 
 use serde_json::Value;
 
-/// The packages of this workspace that each package's own code names as dependencies; those of its tests are left out.
+/// The packages of this workspace that each package's own code names as dependencies; those of its
+/// tests are left out.
 fn dependencies() -> BTreeMap<String, BTreeSet<String>> {
     let output = Command::new(env!("CARGO"))
         .args([
@@ -58,6 +60,14 @@ fn names(of: &[&str]) -> BTreeSet<String> {
 #[test]
 fn the_verifier_depends_on_model_and_firmware_alone() {
     assert_eq!(reached("verify"), names(&["firmware", "model"]));
+}
+
+/// `cargo fw` must not wait for synthesis, simulation and report, nor `cargo test-all` for
+/// anything.
+#[test]
+fn the_runners_are_built_without_the_engine() {
+    assert_eq!(reached("fw"), names(&["firmware", "model"]));
+    assert_eq!(reached("test-all"), names(&[]));
 }
 
 #[test]

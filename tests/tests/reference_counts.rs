@@ -1,27 +1,20 @@
 //! Winning-cell counts measured with independent programs.
 //!
-//! The first three rows were met by SCOTS v0.2 and two other solvers (width 0.05, growth bound, w = 2 GW exact); the
-//! others by a solver with a tolerance of 1e-9 instead of outward rounding, hence the 0.1 %.
+//! The first three rows were met by SCOTS v0.2 and two other solvers (width 0.05, growth bound, w =
+//! 2 GW exact); the others by a solver with a tolerance of 1e-9 instead of outward rounding, hence
+//! the 0.1 %.
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on fails")]
 
 use model::interval::Interval;
 use model::plant::GridPlant;
-use model::spec::Spec;
 use synth::abstraction::affine::{AffineAbstraction, AffineInput, Growth};
+use synth::game::Unwatched;
 use synth::game::bitset::BitSet;
 use synth::game::guard::Unguarded;
 use synth::game::reach::reach;
 use synth::game::safety::safety;
-use synth::game::{Unwatched, Watch};
 use synth::synthesis::{self, Synthesis};
-
-fn synthesise(name: &str, set: &[&str]) -> (Spec, Synthesis) {
-    let overrides: Vec<String> = set.iter().map(|s| (*s).to_owned()).collect();
-    let spec = Spec::load(name, &overrides).unwrap();
-    let watch = |_| Box::new(Unwatched) as Box<dyn Watch>;
-    let synthesis = synthesis::synthesise(&spec, &watch).unwrap();
-    (spec, synthesis)
-}
+use tests::testing::{load, synthesised};
 
 fn winning(synthesis: &Synthesis) -> [usize; 2] {
     let c2 = synthesis.c2.as_ref().unwrap();
@@ -30,7 +23,7 @@ fn winning(synthesis: &Synthesis) -> [usize; 2] {
 
 #[test]
 fn bidirectional_without_containment() {
-    let (spec, synthesis) = synthesise("paper-bi", &["requirements.containment_hz=none"]);
+    let (spec, synthesis) = synthesised("paper-bi", &["requirements.containment_hz=none"]);
     assert_eq!(synthesis.grid.cells(), 2_358_443);
     assert_eq!(winning(&synthesis), [1_075_271, 1_382_894]);
     let abstraction = synthesis::abstraction(&spec, &synthesis.grid).unwrap();
@@ -41,14 +34,14 @@ fn bidirectional_without_containment() {
 
 #[test]
 fn bidirectional_with_containment() {
-    let (_, synthesis) = synthesise("paper-bi", &[]);
+    let (_, synthesis) = synthesised("paper-bi", &[]);
     assert_eq!(winning(&synthesis), [1_042_103, 1_349_726]);
 }
 
 #[test]
 fn unidirectional_as_printed_without_containment() {
     // The paper's bounds as printed, at the period of the bidirectional row.
-    let (spec, synthesis) = synthesise(
+    let (spec, synthesis) = synthesised(
         "paper-uni",
         &[
             "requirements.containment_hz=none",
@@ -65,8 +58,8 @@ fn unidirectional_as_printed_without_containment() {
 
 /// A row of the table of robust reach-and-stay games on 11.55 million cells.
 ///
-/// Two independent oracles: one lets the fleet deliver up to 1.1 u, also past the whole fleet; the other, as the spec
-/// says, at most the whole fleet. They differ in the inputs 0.95 and 1 only.
+/// Two independent oracles: one lets the fleet deliver up to 1.1 u, also past the whole fleet; the
+/// other, as the spec says, at most the whole fleet. They differ in the inputs 0.95 and 1 only.
 struct Robust {
     name: &'static str,
     band: [f64; 2],
@@ -86,17 +79,17 @@ fn robust(row: &Robust, cap: bool) -> [usize; 2] {
         (56, "bidirectional")
     };
     let overrides = [
-        "grid.lower=[-1.0,-0.6,-0.3,-0.3]".to_owned(),
-        "grid.upper=[0.1,3.6,2.2,2.2]".to_owned(),
-        "grid.width=[0.01,0.1,0.05,0.05]".to_owned(),
-        "grid.alignment=edges".to_owned(),
-        "sampling.period_s=1.0".to_owned(),
-        "uncertainty.participation=0.1".to_owned(),
-        format!("fleet.power_per_charger_kw={kw}"),
-        format!("fleet.direction={direction}"),
-        format!("uncertainty.loss_gw={:?}", row.loss),
+        "grid.lower=[-1.0,-0.6,-0.3,-0.3]",
+        "grid.upper=[0.1,3.6,2.2,2.2]",
+        "grid.width=[0.01,0.1,0.05,0.05]",
+        "grid.alignment=edges",
+        "sampling.period_s=1.0",
+        "uncertainty.participation=0.1",
+        &format!("fleet.power_per_charger_kw={kw}"),
+        &format!("fleet.direction={direction}"),
+        &format!("uncertainty.loss_gw={:?}", row.loss),
     ];
-    let spec = Spec::load("paper-bi", &overrides).unwrap();
+    let spec = load("paper-bi", &overrides);
     let grid = synthesis::device_grid(&spec).unwrap();
     let shape = synthesis::grid_shape(&grid);
     let (a, b) = GridPlant::new(&spec).matrices();
@@ -119,7 +112,8 @@ fn robust(row: &Robust, cap: bool) -> [usize; 2] {
     let error = row.error.map(|e| e * 1e6);
     let abstraction =
         AffineAbstraction::new(shape, &inputs, 1.0, Growth::ExactLinear, error).unwrap();
-    // The oracles did not shrink I2 and containment by the error of f, as the product does: the sets are built here.
+    // The oracles did not shrink I2 and containment by the error of f, as the product does: the
+    // sets are built here.
     let by_f = |choose: &dyn Fn(f64, f64) -> bool| {
         let mut set = BitSet::new(shape.cells());
         for i in 0..shape.cells() {

@@ -1,5 +1,10 @@
-//! The report: its numbers are those of the runs, it is the same every time, and a browser shows it.
-#![allow(clippy::unwrap_used, reason = "a test that cannot go on fails")]
+//! The report: its numbers are those of the runs, it is the same every time, and a browser shows
+//! it.
+#![allow(
+    clippy::unwrap_used,
+    clippy::expect_used,
+    reason = "a test that cannot go on fails"
+)]
 
 use std::process::Command;
 use std::sync::OnceLock;
@@ -11,32 +16,12 @@ use lab::report::{Findings, Rendered, render_studies};
 use lab::simulation::closed_loop::{Estimator, simulate};
 use lab::simulation::scenario::Scenario;
 use lab::simulation::trajectory::Run;
-use model::spec::Spec;
 use model::verdict::{Counts, Method, Verdict};
 use serde_json::Value;
-use synth::game::{Sweep, Watch};
-use synth::pipeline::{self, Encoding};
-use synth::synthesis;
+use tests::testing::{dense, load};
 
 /// Runs of the robustness section: enough to fill it.
 const RUNS: usize = 20;
-
-struct Quiet;
-
-impl Watch for Quiet {
-    fn sweep(&self, _: &Sweep) -> bool {
-        true
-    }
-}
-
-/// The dense table: the lowest allowed input of each cell, whatever the compression does.
-fn dense(name: &str) -> (Spec, Vec<u8>) {
-    let spec = Spec::load(name, &[]).unwrap();
-    let quiet = |_| Box::new(Quiet) as Box<dyn Watch>;
-    let synthesis = synthesis::synthesise(&spec, &quiet).unwrap();
-    let emitted = pipeline::emit(&spec, &synthesis, Encoding::Dense, &quiet).unwrap();
-    (spec, emitted.bytes)
-}
 
 fn study() -> &'static Study {
     static STUDY: OnceLock<Study> = OnceLock::new();
@@ -118,7 +103,7 @@ fn rows(name: &str, run: &Run) -> String {
 
 #[test]
 fn data_of_the_figures_is_as_committed() {
-    let spec = Spec::load("paper-bi", &[]).unwrap();
+    let spec = load("paper-bi", &[]);
     let event = BaselineEvent::new(&spec);
     let mut text = String::new();
     text += &rows("none", &event.none);
@@ -165,11 +150,12 @@ addEventListener('load', () => {
 });
 </script></body>"#;
 
-/// The page in a browser; `None` where there is none.
-fn probe(page: &str, dark: bool) -> Option<Value> {
+/// What the page measures of itself in a browser.
+fn probe(page: &str, dark: bool) -> Value {
     let chromium = ["chromium", "chromium-browser", "google-chrome"]
         .into_iter()
-        .find(|name| Command::new(name).arg("--version").output().is_ok())?;
+        .find(|name| Command::new(name).arg("--version").output().is_ok())
+        .expect("no Chromium on the search path: `cargo test-all prerequisites` installs it");
     let dir = tempfile::tempdir().unwrap();
     let path = dir.path().join("report.html");
     std::fs::write(&path, page.replacen("</body>", PROBE, 1)).unwrap();
@@ -203,21 +189,19 @@ fn probe(page: &str, dark: bool) -> Option<Value> {
         .collect();
     assert!(console.is_empty(), "{console:#?}");
     let dom = String::from_utf8_lossy(&output.stdout).into_owned();
-    let title = dom.split("<title>").nth(1)?.split("</title>").next()?;
+    let title = dom.split("<title>").nth(1).unwrap();
+    let title = title.split("</title>").next().unwrap();
     let title = title
         .replace("&lt;", "<")
         .replace("&gt;", ">")
         .replace("&amp;", "&");
-    Some(serde_json::from_str(&title).unwrap())
+    serde_json::from_str(&title).unwrap()
 }
 
 #[test]
 fn a_browser_shows_the_page() {
     let page = rendered();
-    let Some(light) = probe(&page.html, false) else {
-        eprintln!("SKIPPED: no Chromium on the search path; test-all installs it");
-        return;
-    };
+    let light = probe(&page.html, false);
     let figures = light["figures"].as_array().unwrap();
     assert_eq!(figures.len(), page.figures.len());
     for figure in figures {
@@ -241,7 +225,7 @@ fn a_browser_shows_the_page() {
     }
     assert_eq!(light["overflow"], false);
     assert!(light["tables"].as_u64().unwrap() > figures.len() as u64);
-    let dark = probe(&page.html, true).unwrap();
+    let dark = probe(&page.html, true);
     assert_ne!(
         light["ink"], dark["ink"],
         "the drawing does not follow the colour scheme"

@@ -1,9 +1,7 @@
 //! The tables in firmware/tables: made again from their specs byte for byte, and proven.
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on fails")]
 
-use model::spec::Spec;
-use synth::game::{Unwatched, Watch};
-use synth::pipeline;
+use tests::testing::{built, shipped};
 
 #[test]
 fn every_shipped_table_regenerates_and_is_proven() {
@@ -15,17 +13,15 @@ fn every_shipped_table_regenerates_and_is_proven() {
         .map(|path| path.file_stem().unwrap().to_str().unwrap().to_owned())
         .collect();
     names.sort();
-    for needed in ["paper-bi", "paper-uni", "gb-bi", "gb-uni"] {
+    for needed in ["paper-bi", "paper-uni", "gb-bi", "gb-bi-delay", "gb-uni"] {
         assert!(
             names.iter().any(|name| name == needed),
             "{needed} is not shipped"
         );
     }
     for name in names {
-        let spec = Spec::load(&name, &[]).unwrap();
-        let watch = |_| Box::new(Unwatched) as Box<dyn Watch>;
-        let made = pipeline::table_bytes(&spec, None, &watch).unwrap();
-        let shipped = std::fs::read(folder.join(format!("{name}.bin"))).unwrap();
+        let (spec, made) = built(&name, &[]);
+        let shipped = shipped(&name);
         assert!(
             made == shipped,
             "firmware/tables/{name}.bin ({} bytes) is not what its spec gives ({} bytes): \

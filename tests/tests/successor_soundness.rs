@@ -1,9 +1,10 @@
 //! No real successor escapes its box, and no trajectory leaves the band that a guard promised.
 //!
-//! Millions of random samples: states at corners and inside of cells, every input, losses and participation errors that
-//! jump between their extremes within a period, errors of the estimate before and after. The reference steps are plain
-//! floating point (nalgebra's exponential); its rounding is below 1e-6 micro-units, so a state is only counted as
-//! outside if it is by more than that.
+//! Millions of random samples: states at corners and inside of cells, every input, losses and
+//! participation errors that jump between their extremes within a period, errors of the estimate
+//! before and after. The reference steps are plain floating point (nalgebra's exponential); its
+//! rounding is below 1e-6 micro-units, so a state is only counted as outside if it is by more than
+//! that.
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on fails")]
 
 use model::plant::GridPlant;
@@ -16,6 +17,7 @@ use synth::abstraction::affine::AffineInput;
 use synth::abstraction::tube::TubeGuard;
 use synth::game::guard::Guard;
 use synth::synthesis;
+use tests::testing::load;
 
 /// Pieces of a period on which loss and participation are held.
 const PIECES: usize = 5;
@@ -46,10 +48,6 @@ impl Random {
 }
 
 fn specs() -> Vec<Spec> {
-    let load = |name: &str, set: &[&str]| {
-        let set: Vec<String> = set.iter().map(|s| (*s).to_owned()).collect();
-        Spec::load(name, &set).unwrap()
-    };
     let robust = [
         "uncertainty.loss_gw=[1.8,2.2]",
         "uncertainty.participation=0.1",

@@ -6,7 +6,7 @@ use firmware::link::{FRAME_MAX, LENGTH_LEN, Reply, Request, decode_frame, encode
 /// Plays the frames in `bytes` to a session; whether one of them was a request.
 pub fn run(bytes: &[u8]) -> bool {
     let wires = Wires::default();
-    let mut session = Session::new(&wires, super::table::SHIPPED);
+    let mut session = Session::new(&wires, super::table::SHIPPED[0]);
     let mut understood = false;
     let mut rest = bytes;
     while let Some(prefix) = rest.first_chunk::<LENGTH_LEN>() {

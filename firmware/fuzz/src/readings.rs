@@ -15,7 +15,7 @@ pub fn run(bytes: &[u8]) -> bool {
         return false;
     };
     let wires = Wires::default();
-    let mut session = Session::new(&wires, super::table::SHIPPED);
+    let mut session = Session::new(&wires, super::table::SHIPPED[usize::from(kind >> 7)]);
     let sources = [
         SourceKind::Deviation,
         SourceKind::Ade7953,

@@ -4,8 +4,12 @@ use firmware::flash;
 use firmware::grid::Cell;
 use firmware::table::{CRC_LEN, Law, TableView, checksum, field};
 
-/// The table of the chargers that the other targets play to.
-pub const SHIPPED: &[u8] = include_bytes!("../../tables/paper-bi.bin");
+/// Tables of the chargers that the other targets play to: laws from games, and a law that is always
+/// on.
+pub const SHIPPED: [&[u8]; 2] = [
+    include_bytes!("../../tables/paper-bi.bin"),
+    include_bytes!("../../tables/gb-bi.bin"),
+];
 
 /// Reads the region, its length and CRC made right; whether the table was accepted.
 pub fn run(region: &[u8]) -> bool {

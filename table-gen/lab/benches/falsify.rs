@@ -12,7 +12,7 @@ use std::time::Instant;
 
 use lab::falsify::falsify;
 use model::spec::Spec;
-use synth::game::{Unwatched, Watch};
+use synth::game::unwatched;
 use synth::{pipeline, synthesis};
 
 const STEPS: u64 = 10_000_000;
@@ -21,7 +21,6 @@ fn main() {
     println!("spec steps trajectories seconds smallest_margin_hz");
     for name in Spec::shipped_names() {
         let spec = Spec::load(name, &[]).unwrap();
-        let unwatched = |_: &'static str| Box::new(Unwatched) as Box<dyn Watch>;
         let laws = synthesis::synthesise(&spec, &unwatched).unwrap();
         let encoding = pipeline::Encoding::default();
         let bytes = pipeline::emit(&spec, &laws, encoding, &unwatched)

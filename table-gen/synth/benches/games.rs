@@ -9,7 +9,7 @@ use model::spec::Spec;
 use synth::abstraction::Abstraction;
 use synth::game::bitset::BitSet;
 use synth::game::inclusion::Inclusion;
-use synth::game::{Unwatched, Watch};
+use synth::game::unwatched;
 use synth::synthesis;
 
 fn main() {
@@ -47,7 +47,7 @@ fn reach_avoid_c1_and_c2(bencher: Bencher<'_, '_>, size: &str) {
     let cells = spec.grid.cells();
     bencher
         .counter(ItemsCount::new(cells))
-        .bench(|| synthesis::synthesise(&spec, &|_| Box::new(Unwatched) as Box<dyn Watch>));
+        .bench(|| synthesis::synthesise(&spec, &unwatched));
 }
 
 #[divan::bench]

@@ -6,10 +6,12 @@ use firmware::table::HEADER_LEN;
 use lab::falsify::falsify;
 use model::spec::Spec;
 use model::verdict::ClaimName;
+use tests::testing::{dense_of, load};
 
-use super::{judge, table};
+use super::judge;
 
-/// A spec with Hold, a delay of half a period, and a little of every other uncertainty, on a grid of 492,480 cells.
+/// A spec with Hold, a delay of half a period, and a little of every other uncertainty, on a grid
+/// of 492,480 cells.
 const DELAYED: [&str; 9] = [
     "name=delayed",
     "grid={lower=[-0.9,-0.4,-0.2,-0.2],upper=[0.3,3.4,2.2,2.2],width=[0.02,0.2,0.1,0.1],alignment=\"edges\"}",
@@ -23,15 +25,10 @@ const DELAYED: [&str; 9] = [
 ];
 
 fn delayed(more: &[&str]) -> Spec {
-    let all: Vec<String> = DELAYED
-        .iter()
-        .chain(more)
-        .map(|s| (*s).to_owned())
-        .collect();
-    Spec::load("gb-bi-band", &all).unwrap()
+    load("gb-bi-band", &[&DELAYED, more].concat())
 }
 
-static DELAYED_TABLE: LazyLock<Vec<u8>> = LazyLock::new(|| table(&delayed(&[])));
+static DELAYED_TABLE: LazyLock<Vec<u8>> = LazyLock::new(|| dense_of(&delayed(&[])));
 
 #[test]
 fn a_delayed_table_is_proven_and_stands() {
@@ -42,7 +39,8 @@ fn a_delayed_table_is_proven_and_stands() {
     assert!(low >= -0.4 && high <= 0.2);
     let stands = falsify(&DELAYED_TABLE, &spec, 200_000, 1).unwrap();
     assert_eq!(stands.violation, None);
-    // Three times the uncertainty of the loss, and much more of the participation: a real trajectory breaks it.
+    // Three times the uncertainty of the loss, and much more of the participation: a real
+    // trajectory breaks it.
     let wider = delayed(&[
         "uncertainty.loss_gw=[1.8,2.2]",
         "uncertainty.participation=0.3",
@@ -63,7 +61,8 @@ fn a_changed_coefficient_and_another_delay_are_rejected() {
         firmware::table::seal(&mut image).unwrap();
         image
     };
-    // A hundredth of Φ_ff, of W on f, and a tenth of G_3 on f: each moves the prediction by a few mHz.
+    // A hundredth of Φ_ff, of W on f, and a tenth of G_3 on f: each moves the prediction by a few
+    // mHz.
     let third = 20 + 4 * 2;
     for (word, share) in [(0, 100), (16, 50), (third, 5)] {
         let mutant = with(word, &|value| value + value / share);
@@ -84,9 +83,8 @@ fn a_changed_coefficient_and_another_delay_are_rejected() {
 
 #[test]
 fn the_papers_table_is_proven_with_half_a_second() {
-    let set = ["uncertainty.actuation_delay_s=0.5".to_owned()];
-    let spec = Spec::load("paper-bi", &set).unwrap();
-    let bytes = table(&spec);
+    let spec = load("paper-bi", &["uncertainty.actuation_delay_s=0.5"]);
+    let bytes = dense_of(&spec);
     let verdict = judge(&bytes, &spec);
     assert!(verdict.verified, "{:#?}", verdict.claims);
     let lowest = verdict

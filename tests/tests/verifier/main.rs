@@ -17,8 +17,7 @@ use firmware::table::{Law, TableView};
 use lab::falsify::witness;
 use model::spec::Spec;
 use model::verdict::Verdict;
-use synth::game::{Unwatched, Watch};
-use synth::{pipeline, synthesis};
+use tests::testing::{dense, dense_of, load};
 
 /// A spec with Hold and a little of every uncertainty, on a grid of 435,600 cells.
 const SMALL: [&str; 6] = [
@@ -32,23 +31,11 @@ const SMALL: [&str; 6] = [
 
 /// The small spec, with further overrides.
 fn small(more: &[&str]) -> Spec {
-    let all: Vec<String> = SMALL.iter().chain(more).map(|s| (*s).to_owned()).collect();
-    Spec::load("gb-bi-band", &all).unwrap()
+    load("gb-bi-band", &[&SMALL, more].concat())
 }
 
-/// The dense table of a spec.
-fn table(spec: &Spec) -> Vec<u8> {
-    let unwatched = |_: &'static str| Box::new(Unwatched) as Box<dyn Watch>;
-    let synthesis = synthesis::synthesise(spec, &unwatched).unwrap();
-    let watch = |_| Box::new(Unwatched) as Box<dyn Watch>;
-    let encoding = pipeline::Encoding::Dense;
-    pipeline::emit(spec, &synthesis, encoding, &watch)
-        .unwrap()
-        .bytes
-}
-
-static SMALL_TABLE: LazyLock<Vec<u8>> = LazyLock::new(|| table(&small(&[])));
-static PAPER_BI: LazyLock<Vec<u8>> = LazyLock::new(|| table(&Spec::load("paper-bi", &[]).unwrap()));
+static SMALL_TABLE: LazyLock<Vec<u8>> = LazyLock::new(|| dense_of(&small(&[])));
+static PAPER_BI: LazyLock<Vec<u8>> = LazyLock::new(|| dense("paper-bi").1);
 
 /// The verdict on a table, with a real trajectory for what fails if one is found.
 fn judge(bytes: &[u8], spec: &Spec) -> Verdict {

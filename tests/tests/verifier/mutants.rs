@@ -7,6 +7,7 @@ use lab::falsify::adversaries::Constant;
 use lab::falsify::trajectory::Trajectories;
 use model::spec::Spec;
 use model::verdict::{ClaimName, Verdict};
+use tests::testing::load;
 use verify::{VerifyError, verify};
 
 use super::{PAPER_BI, SMALL_TABLE, judge, small, with_entry};
@@ -86,7 +87,7 @@ fn a_cut_in_its_reach_is_rejected() {
             "the nominal trajectory meets the hole"
         );
     }
-    let spec = Spec::load("paper-bi", &[]).unwrap();
+    let spec = load("paper-bi", &[]);
     let (phase, cell, _) = decisions(&PAPER_BI, &spec, 300)[1];
     assert_eq!(phase, Phase::C1);
     let verdict = judge(&with_entry(&PAPER_BI, Law::C1, cell, 0), &spec);
@@ -98,8 +99,9 @@ fn a_cut_in_its_reach_is_rejected() {
 fn a_leaf_changed_by_one_level_is_rejected_where_it_matters() {
     let spec = small(&[]);
     let table = TableView::parse(&SMALL_TABLE).unwrap();
-    // Changing by a level matters for Hold, whose margin is a fraction of a level: of the Hold decisions of the nominal
-    // trajectory and their neighbours by one level, some must break the proof.
+    // Changing by a level matters for Hold, whose margin is a fraction of a level: of the Hold
+    // decisions of the nominal trajectory and their neighbours by one level, some must break the
+    // proof.
     let mut rejected = 0;
     let mut tried = 0;
     for (phase, cell, level) in decisions(&SMALL_TABLE, &spec, 600) {
@@ -123,7 +125,7 @@ fn a_leaf_changed_by_one_level_is_rejected_where_it_matters() {
 
 #[test]
 fn swapped_phases_are_rejected() {
-    let spec = Spec::load("paper-bi", &[]).unwrap();
+    let spec = load("paper-bi", &[]);
     let view = TableView::parse(&PAPER_BI).unwrap();
     let laws = view.header().laws;
     let (c1, c2): (LawEntry, LawEntry) = (laws[0].unwrap(), laws[1].unwrap());
@@ -135,7 +137,8 @@ fn swapped_phases_are_rejected() {
     swapped[HEADER_LEN..HEADER_LEN + len2].copy_from_slice(&blocks[len1..len1 + len2]);
     swapped[HEADER_LEN + len2..HEADER_LEN + len2 + len1].copy_from_slice(&blocks[..len1]);
     seal(&mut swapped).unwrap();
-    // The laws are robust enough to do each other's work here; but then C1 is in force where C2 should be.
+    // The laws are robust enough to do each other's work here; but then C1 is in force where C2
+    // should be.
     fails(&judge(&swapped, &spec), ClaimName::HandOver);
 }
 
@@ -180,7 +183,7 @@ fn wider_uncertainty_than_proven_is_rejected() {
 fn a_slower_settling_than_asked_is_rejected() {
     let verdict = judge(&SMALL_TABLE, &small(&["requirements.settle_within_s=3"]));
     fails(&verdict, ClaimName::Settle);
-    let spec = Spec::load("paper-bi", &["requirements.settle_within_s=5".to_owned()]).unwrap();
+    let spec = load("paper-bi", &["requirements.settle_within_s=5"]);
     let verdict = judge(&PAPER_BI, &spec);
     fails(&verdict, ClaimName::Settle);
     assert!(verdict.counterexample.unwrap().real.is_some());
@@ -188,7 +191,7 @@ fn a_slower_settling_than_asked_is_rejected() {
 
 #[test]
 fn a_higher_containment_than_kept_is_refuted() {
-    let spec = Spec::load("paper-bi", &["requirements.containment_hz=-0.4".to_owned()]).unwrap();
+    let spec = load("paper-bi", &["requirements.containment_hz=-0.4"]);
     let verdict = judge(&PAPER_BI, &spec);
     fails(&verdict, ClaimName::Containment);
     let real = verdict.counterexample.unwrap().real.unwrap();
@@ -197,7 +200,7 @@ fn a_higher_containment_than_kept_is_refuted() {
 
 #[test]
 fn for_ever_is_not_claimed_without_hold() {
-    let spec = Spec::load("paper-bi", &["requirements.horizon_s=none".to_owned()]).unwrap();
+    let spec = load("paper-bi", &["requirements.horizon_s=none"]);
     let verdict = judge(&PAPER_BI, &spec);
     assert!(!verdict.verified);
 }

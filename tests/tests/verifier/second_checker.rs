@@ -1,9 +1,10 @@
 //! A second opinion: slow, simple, and written another way.
 //!
-//! Exact rational arithmetic is out of reach of exp, so this checker works with plain numbers and a slack that is far
-//! larger than their rounding: cells are sampled by their corners (the flow is affine, so corners are extreme), the
-//! disturbance's reach is a sum over fine steps, times within the period are sampled densely. What it sees must be within
-//! what the verifier proved; and on a small table it must find the same set of cells, up to those on the edge of its slack.
+//! Exact rational arithmetic is out of reach of exp, so this checker works with plain numbers and a
+//! slack that is far larger than their rounding: cells are sampled by their corners (the flow is
+//! affine, so corners are extreme), the disturbance's reach is a sum over fine steps, times within
+//! the period are sampled densely. What it sees must be within what the verifier proved; and on a
+//! small table it must find the same set of cells, up to those on the edge of its slack.
 
 use std::collections::{BTreeSet, VecDeque};
 
@@ -153,7 +154,8 @@ fn a_second_checker_agrees_on_a_small_table() {
             }
         }
         let end = checker.after(FINE - 1, &real, power);
-        // A thousandth of a micro-unit inside: plain numbers must not find more than the outward-rounded ones.
+        // A thousandth of a micro-unit inside: plain numbers must not find more than the
+        // outward-rounded ones.
         let index = |axis: usize, v: f64| {
             let offset = v - f64::from(grid.lower_edge()[axis]);
             (offset / f64::from(grid.width()[axis])).floor() as u16
@@ -193,7 +195,8 @@ fn a_second_checker_agrees_on_a_small_table() {
     assert!(lowest / 1e6 >= bound - 1e-9, "{} < {bound}", lowest / 1e6);
 }
 
-/// The cell of the first decision of a trajectory with initial state, moment and loss drawn from `n`.
+/// The cell of the first decision of a trajectory with initial state, moment and loss drawn from
+/// `n`.
 fn first_decision(spec: &Spec, table: &TableView<'_>, n: u32) -> Option<[u16; 4]> {
     let plant = GridPlant::new(spec);
     let share = |k: u32| f64::from(n.wrapping_mul(2_654_435_761).rotate_left(k) % 1000) / 999.0;

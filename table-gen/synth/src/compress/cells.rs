@@ -42,3 +42,33 @@ pub fn labelled_cells(
         })
         .collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn cells_come_in_the_dense_order_and_those_without_a_label_do_not() {
+        let shape = GridShape {
+            lower: [0.0; STATES],
+            width: [1.0; STATES],
+            count: [3, 2, 1, 2],
+        };
+        let found = labelled_cells(&shape, |index, cell| {
+            assert_eq!(shape.index(cell.map(u32::from)), index);
+            u64::from(cell[0] != 1) << cell[3]
+        });
+        let expected = [
+            ([0, 0, 0, 0], 1),
+            ([2, 0, 0, 0], 1),
+            ([0, 1, 0, 0], 1),
+            ([2, 1, 0, 0], 1),
+            ([0, 0, 0, 1], 2),
+            ([2, 0, 0, 1], 2),
+            ([0, 1, 0, 1], 2),
+            ([2, 1, 0, 1], 2),
+        ];
+        let expected = expected.map(|(cell, labels)| LabelledCell { cell, labels });
+        assert_eq!(found, expected);
+    }
+}

@@ -81,3 +81,16 @@ fn whole(value: f64, bound: f64) -> Option<f64> {
     let value = value.round();
     (value.abs() <= bound).then_some(value)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_factor_is_rounded_and_refused_past_its_bound() {
+        assert_eq!(whole(2.4, 3.0), Some(2.0));
+        assert_eq!(whole(-3.4, 3.0), Some(-3.0));
+        assert_eq!(whole(3.6, 3.0), None);
+        assert_eq!(whole(f64::NAN, 3.0), None);
+    }
+}

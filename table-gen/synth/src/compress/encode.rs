@@ -63,3 +63,53 @@ fn encode_below(tree: &Tree, low: [u16; STATES]) -> Result<Vec<u8>, CompressErro
     out.extend(below);
     Ok(out)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::compress::split::Plane;
+
+    fn split(axis: usize, threshold: u16, left: Tree, right: Tree) -> Tree {
+        Tree::Split {
+            plane: Plane { axis, threshold },
+            left: Box::new(left),
+            right: Box::new(right),
+        }
+    }
+
+    #[test]
+    fn the_tree_of_the_formats_own_test_has_its_bytes() {
+        // f below 2 gives level 1; else g below 1 gives level 2, else the first law. The same bytes
+        // stand in firmware/tests/table_format.rs, written by hand.
+        let tree = split(
+            0,
+            2,
+            Tree::Leaf(1),
+            split(1, 1, Tree::Leaf(2), Tree::Leaf(32)),
+        );
+        let law = AffineFunction {
+            factors: [1024, 0, 0, 0],
+            constant: -1024,
+        };
+        let bytes = [
+            0x01, // one law
+            0x00, 0x04, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00, // factors
+            0x00, 0xFC, 0xFF, 0xFF, // constant
+            0x10, 0x01, // f, delta 2; left leaf 1, right node follows
+            0x0D, 0x42, 0x20, // g, delta 1; leaves 2 and law 0
+        ];
+        assert_eq!(encode_inputs(&tree, &[law]).unwrap(), bytes);
+        assert_eq!(encode_nodes(&Tree::Leaf(7)).unwrap(), [7]);
+    }
+
+    #[test]
+    fn a_threshold_counts_from_its_boxs_lower_edge() {
+        let leaves = || (Tree::Leaf(1), Tree::Leaf(2));
+        let (left, right) = leaves();
+        let inner = split(0, 12, left, right);
+        let nested = encode_nodes(&split(0, 10, Tree::Leaf(0), inner)).unwrap();
+        let (left, right) = leaves();
+        let alone = encode_nodes(&split(0, 2, left, right)).unwrap();
+        assert!(nested.ends_with(&alone), "{nested:x?} {alone:x?}");
+    }
+}

@@ -144,3 +144,53 @@ pub fn tightened(space: &AffineFunction, shares: u32) -> impl Iterator<Item = Af
         constant: space.constant - largest * share as i32 / shares as i32,
     })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const NORMAL: [i16; STATES] = [1, 0, 0, 0];
+
+    fn points(f: impl IntoIterator<Item = i32>) -> Vec<Point> {
+        f.into_iter().map(|f| [f, 0, 0, 0]).collect()
+    }
+
+    #[test]
+    fn a_cut_sheds_losing_cells_unless_too_many_winning_ones_go_with_them() {
+        let losing = points(0..5);
+        assert_eq!(best_cut(NORMAL, &points(5..8), &losing, 5), (5, 5));
+        // A winning cell at 2: five losing ones less its weight, or the two below it.
+        let winning = points([2, 5, 6]);
+        assert_eq!(best_cut(NORMAL, &winning, &losing, 2), (3, 5));
+        assert_eq!(best_cut(NORMAL, &winning, &losing, 4), (2, 2));
+        // The other way round nothing is shed but winning cells.
+        let (score, _) = best_cut(NORMAL.map(|x| -x), &points(5..8), &losing, 5);
+        assert_eq!(score, 0);
+    }
+
+    #[test]
+    fn the_hull_of_a_band_is_its_two_faces() {
+        let winning = points(3..=6);
+        let losing = points((0..3).chain(7..12));
+        let hull = hull(&[NORMAL, NORMAL.map(|x| -x)], &winning, &losing);
+        // The face that sheds five first, then the one that sheds three.
+        let faces = [(-1, 6), (1, -3)].map(|(factor, constant)| AffineFunction {
+            factors: [factor, 0, 0, 0],
+            constant,
+        });
+        assert_eq!(hull, faces);
+        let holds = |f| hull.iter().all(|space| value(space, [f, 0, 0, 0]) >= 0);
+        assert!((3..=6).all(holds) && !holds(2) && !holds(7));
+    }
+
+    #[test]
+    fn tighter_ones_move_by_shares_of_the_largest_factor() {
+        let space = AffineFunction {
+            factors: [1, -4, 0, 2],
+            constant: 10,
+        };
+        let constants: Vec<i32> = tightened(&space, 4).map(|s| s.constant).collect();
+        assert_eq!(constants, [10, 9, 8, 7]);
+        assert_eq!(value(&space, [3, 2, 5, 1]), 10 + 3 - 8 + 2);
+    }
+}

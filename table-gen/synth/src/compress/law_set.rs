@@ -117,3 +117,88 @@ pub fn choose_laws(
     }
     LawSet { laws, levels }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::compress::split::Plane;
+    use firmware::table::AFFINE_FRACTION_BITS;
+
+    const ONE: i32 = 1 << AFFINE_FRACTION_BITS;
+    /// The level is f.
+    const RISING: AffineFunction = AffineFunction {
+        factors: [ONE as i16, 0, 0, 0],
+        constant: 0,
+    };
+    /// The level is 3.
+    const THREE: AffineFunction = AffineFunction {
+        factors: [0; STATES],
+        constant: 3 * ONE,
+    };
+    const LEVELS: u8 = 8;
+    const LAW: u64 = 1 << LEAF_AFFINE;
+
+    fn at(f: u16) -> [u16; STATES] {
+        [f, 0, 0, 0]
+    }
+
+    fn set(laws: &[AffineFunction]) -> LawSet {
+        LawSet {
+            laws: laws.to_vec(),
+            levels: LEVELS,
+        }
+    }
+
+    #[test]
+    fn a_cell_may_name_its_levels_and_the_laws_that_give_one_of_them() {
+        let set = set(&[RISING, THREE]);
+        assert_eq!(set.labels(at(2), 0b0101), 0b0101 | LAW);
+        assert_eq!(set.labels(at(1), 0b1101), 0b1101 | LAW << 1);
+        assert_eq!(set.labels(at(1), 0b0101), 0b0101);
+        // A leaf that names a level gives it; one that names a law gives what the law says.
+        assert_eq!(set.level(5, at(2)), 5);
+        assert_eq!(set.level(LEAF_AFFINE, at(2)), 2);
+        assert_eq!(set.level(LEAF_AFFINE + 1, at(2)), 3);
+    }
+
+    #[test]
+    fn a_box_gets_the_first_law_or_the_level_nearest_to_it() {
+        let set = set(&[RISING, THREE]);
+        let cells = [2, 4].map(|f| LabelledCell {
+            cell: at(f),
+            labels: 1,
+        });
+        assert_eq!(set.choose(0b0100 | LAW << 1, &cells), LEAF_AFFINE + 1);
+        // The first law says 3 on average.
+        assert_eq!(set.choose(0b10_0101, &cells), 2);
+        assert_eq!(set.choose(0b11_0001, &cells), 4);
+    }
+
+    #[test]
+    fn laws_that_no_leaf_names_are_dropped() {
+        let tree = Tree::Split {
+            plane: Plane {
+                axis: 0,
+                threshold: 1,
+            },
+            left: Box::new(Tree::Leaf(6)),
+            right: Box::new(Tree::Leaf(LEAF_AFFINE + 1)),
+        };
+        let (kept, renumbered) = set(&[RISING, THREE]).used(&tree);
+        assert_eq!(kept.laws, [THREE]);
+        assert_eq!(renumbered.leaf(Cell(at(0))), 6);
+        assert_eq!(renumbered.leaf(Cell(at(1))), LEAF_AFFINE);
+    }
+
+    #[test]
+    fn laws_are_chosen_by_the_cells_that_they_add() {
+        // RISING fits f = 0 to 4 and THREE fits 3, 5 and 6: after RISING it adds two.
+        let mut cells: Vec<_> = (0..5).map(|f| (at(f), 1 << f)).collect();
+        cells.extend([5, 6].map(|f| (at(f), 1 << 3)));
+        let chosen = choose_laws(&[THREE, RISING], LEVELS, &cells);
+        assert_eq!(chosen.laws, [RISING, THREE]);
+        // Where the first fits all, no second is worth its bytes.
+        let chosen = choose_laws(&[THREE, RISING], LEVELS, &cells[..5]);
+        assert_eq!(chosen.laws, [RISING]);
+    }
+}

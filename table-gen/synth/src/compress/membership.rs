@@ -319,3 +319,92 @@ fn used(predicates: &Predicates, tree: &Tree) -> (Predicates, Tree) {
     }
     (kept, tree.renumbered(&to))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    const COUNT: [u16; STATES] = [9, 1, 1, 1];
+    const DEPTH_MAX: u32 = 20;
+
+    /// The part for the winning among the cells f = 0 to 8.
+    fn part(winning: &[u16], predicates: &Predicates, budget: u32) -> DomainPart {
+        let cells: Vec<_> = (0..COUNT[0])
+            .map(|f| ([f, 0, 0, 0], winning.contains(&f)))
+            .collect();
+        describe(cells.into_par_iter(), COUNT, predicates, budget, DEPTH_MAX).unwrap()
+    }
+
+    fn covered(part: &DomainPart) -> Vec<u16> {
+        (0..COUNT[0])
+            .filter(|f| part.covers([*f, 0, 0, 0], COUNT))
+            .collect()
+    }
+
+    #[test]
+    fn the_cell_that_costs_most_is_given_up() {
+        let winning = [2, 3, 4, 5, 7];
+        let exact = part(&winning, &Predicates::default(), 0);
+        assert_eq!(covered(&exact), winning);
+        // Outside, inside, outside, inside, outside: five leaves. Without the lone cell three.
+        assert_eq!(exact.tree.leaves(), 5);
+        let given_up = part(&winning, &Predicates::default(), 1);
+        assert_eq!(covered(&given_up), [2, 3, 4, 5]);
+        assert_eq!(given_up.tree.leaves(), 3);
+    }
+
+    #[test]
+    fn a_half_space_that_says_it_all_is_one_leaf() {
+        let from = |f: i32| AffineFunction {
+            factors: [1, 0, 0, 0],
+            constant: -f,
+        };
+        let predicates = Predicates {
+            spaces: vec![from(6), from(3)],
+            ..Predicates::default()
+        };
+        let part = part(&[3, 4, 5, 6, 7, 8], &predicates, 0);
+        // The first half-space is not named: it is dropped, and the second is the first.
+        assert_eq!(part.predicates.spaces, [from(3)]);
+        assert_eq!(part.tree, Tree::Leaf(LEAF_HALF_SPACE));
+        assert_eq!(covered(&part), [3, 4, 5, 6, 7, 8]);
+    }
+
+    #[test]
+    fn a_confined_part_covers_nothing_outside_its_box() {
+        let mut part = part(&[0, 1, 2, 3, 4, 5, 6, 7, 8], &Predicates::default(), 0);
+        assert_eq!(part.tree, Tree::Leaf(LEAF_INSIDE));
+        part.confine([2, 0, 0, 0], [4, 0, 0, 0], COUNT.map(u32::from))
+            .unwrap();
+        assert_eq!(covered(&part), [2, 3, 4]);
+    }
+
+    proptest! {
+        #[test]
+        fn no_losing_cell_is_covered_and_few_winning_ones_are_not(
+            won in proptest::collection::vec(any::<bool>(), 4 * 3 * 2), budget in 0u32..6,
+            hull in -4i32..4,
+        ) {
+            let count = [4, 3, 2, 1];
+            let cells: Vec<_> = won.iter().enumerate().map(|(i, won)| {
+                let i = i as u16;
+                ([i % 4, i / 4 % 3, i / 12, 0], *won)
+            }).collect();
+            let predicates = Predicates {
+                spaces: vec![AffineFunction { factors: [1, -1, 1, 0], constant: hull }],
+                hull: 1,
+                aheads: Vec::new(),
+            };
+            let listed = cells.clone().into_par_iter();
+            let part = describe(listed, count, &predicates, budget, DEPTH_MAX).unwrap();
+            let mut missed = 0;
+            for (cell, won) in cells {
+                let covered = part.covers(cell, count);
+                prop_assert!(won || !covered, "{cell:?} is lost and covered");
+                missed += u32::from(won && !covered);
+            }
+            prop_assert!(missed <= budget, "{missed} of {budget} given up");
+        }
+    }
+}

@@ -2,8 +2,8 @@
 //!
 //! | file in firmware/expected | holds | measured by |
 //! |---|---|---|
-//! | `sizes.txt` | flash and static RAM by section, panics, allocation, float formatting | the ELF files |
-//! | `run.txt` | stack, instructions of a lookup and of a tick | QEMU: painted stack, system timer under `-icount` |
+//! | `sizes.txt` | flash and static RAM by section, panics, allocation, float text | ELF files |
+//! | `run.txt` | stack, instructions of a lookup and of a tick | QEMU: paint, timer by `-icount` |
 //!
 //! A figure past its goal fails, but for the misses that the file already states: those are told at
 //! every run. The text itself must be equal as well, as long as compiler and table are those that

@@ -5,7 +5,7 @@ use std::path::Path;
 use std::process::{Command, Output};
 
 use firmware::table::{CRC_LEN, checksum, field};
-use tests::root;
+use fw::root;
 
 fn check(folder: &Path, arguments: &[&str], variable: Option<&str>) -> (i32, String) {
     let mut command = Command::new(env!("CARGO_BIN_EXE_fw"));

@@ -4,5 +4,6 @@
 pub mod machine;
 pub mod mains;
 pub mod qemu;
+pub mod record;
 pub mod run;
 pub mod scenario;

@@ -11,23 +11,21 @@ use clap::{Parser, Subcommand};
 use firmware::link::session::{Session, Wires};
 use firmware::link::{Request, Setup, SourceKind};
 use firmware::table::TableView;
-use lab::record::{self, ReadOptions};
-use model::spec::Spec;
-use synth::game::Unwatched;
-use synth::pipeline;
-use tests::costs::{self, CostError};
-use tests::images::{self, Elf, Image, PIL, PRODUCTS};
-use tests::pil::machine::{self, Machine};
-use tests::pil::qemu::Target;
-use tests::pil::run::{Outcome, Pair, closed_loop, recorded};
-use tests::pil::scenario::{self, Scenario};
-use tests::table_fit::{self, Candidate, Product};
-use tests::{root, stand_in};
 
-/// The recorded day, beside the repository.
-const RECORDED: &str = "../shared/data/gb-frequency-2019-08-09.csv";
+use fw::costs::{self, CostError};
+use fw::images::{self, Elf, Image, PIL, PRODUCTS};
+use fw::pil::machine::{self, Machine};
+use fw::pil::qemu::Target;
+use fw::pil::run::{Outcome, Pair, closed_loop, recorded};
+use fw::pil::scenario::{self, Scenario};
+use fw::pil::{qemu, record};
+use fw::root;
+use fw::table_fit::{self, Candidate, Product};
+
 /// The table of processor-in-the-loop runs and measurements: a table by games.
 const TABLE: &str = "firmware/tables/paper-bi.bin";
+/// A table whose commands act late.
+const LATE_TABLE: &str = "firmware/tables/gb-bi-delay.bin";
 
 /// Most random scenarios with commands that act late.
 const LATE_SCENARIOS_MAX: u64 = 200;
@@ -68,7 +66,7 @@ enum Command {
         /// Ticks of a random scenario (100 ms each)
         #[arg(long, default_value_t = 600)]
         ticks: u32,
-        /// Table; the shipped one, or one made by hand if none is shipped
+        /// Table [default: the one that the images carry]
         #[arg(long)]
         table: Option<PathBuf>,
         /// The core
@@ -142,10 +140,7 @@ fn main() -> ExitCode {
         Err(error) => {
             eprintln!("error: {error}");
             let wrong = matches!(error.downcast_ref(), Some(CostError::Wrong(_)));
-            let differs = matches!(
-                error.downcast_ref(),
-                Some(tests::pil::qemu::PilError::Differs(_))
-            );
+            let differs = matches!(error.downcast_ref(), Some(qemu::PilError::Differs(_)));
             ExitCode::from(if wrong || differs { 1 } else { 2 })
         }
     }
@@ -255,18 +250,13 @@ fn build_images(out: &Path, log: bool, choice: &Choice) -> Result<(), AnyError> 
     Ok(())
 }
 
-/// The table of a run: the one named, the shipped one, or the stand-in.
-fn table_bytes(named: Option<&Path>) -> Result<Vec<u8>, AnyError> {
-    let shipped = root().join(TABLE);
-    let path = match named {
-        Some(path) => path,
-        None if shipped.exists() => &shipped,
-        None => {
-            println!("no {TABLE}: a stand-in table made by hand is used");
-            return stand_in::table(true).map_err(|error| format!("{error:?}").into());
-        }
-    };
+fn read(path: &Path) -> Result<Vec<u8>, AnyError> {
     std::fs::read(path).map_err(|error| format!("{}: {error}", path.display()).into())
+}
+
+/// The table of a run: the one named, or the one that the images carry.
+fn table_bytes(named: Option<&Path>) -> Result<Vec<u8>, AnyError> {
+    named.map_or_else(|| read(&root().join(TABLE)), read)
 }
 
 fn processor_in_the_loop(
@@ -281,11 +271,14 @@ fn processor_in_the_loop(
         runs(pair, (scenarios, ticks), 0)?;
         replay(pair)
     })?;
-    let late = late_table()?;
+    let late = read(&root().join(LATE_TABLE))?;
     let delay_ticks = TableView::parse(&late)
-        .map_err(|error| format!("{error:?}"))?
+        .map_err(|error| format!("{LATE_TABLE}: {error:?}"))?
         .header()
         .delay_ticks;
+    if delay_ticks == 0 {
+        return Err(format!("{LATE_TABLE}: its commands do not act late").into());
+    }
     println!(
         "a table of {} bytes whose commands act {delay_ticks} ticks late:",
         late.len()
@@ -294,14 +287,6 @@ fn processor_in_the_loop(
         let scenarios = scenarios.min(LATE_SCENARIOS_MAX);
         runs(pair, (scenarios, ticks), delay_ticks)
     })
-}
-
-/// The table of the shipped spec whose commands act late, built now.
-fn late_table() -> Result<Vec<u8>, AnyError> {
-    let spec = Spec::load("gb-bi-delay", &[])?;
-    Ok(pipeline::table_bytes(&spec, None, &|_| {
-        Box::new(Unwatched)
-    })?)
 }
 
 /// Host and target with one table, from the start of the emulator to its end.
@@ -350,7 +335,10 @@ fn runs(
     for n in 0..scenarios {
         let outcome = closed_loop(pair, &late(scenario::random(n, ticks)))
             .map_err(|error| format!("random scenario {n}: {error}"))?;
-        sum.get_or_insert(outcome).add(&outcome);
+        match &mut sum {
+            Some(sum) => sum.add(&outcome),
+            None => sum = Some(outcome),
+        }
     }
     if let Some(sum) = sum {
         tell(&format!("{scenarios} random scenarios"), &sum);
@@ -359,17 +347,7 @@ fn runs(
 }
 
 fn replay(pair: &mut Pair<'_, '_>) -> Result<(), AnyError> {
-    let path = root().join(RECORDED);
-    if !path.exists() {
-        println!("SKIPPED: the replay of 9 August 2019, for {RECORDED} is not there");
-        return Ok(());
-    }
-    let trace = record::read(&path, &ReadOptions::default())?;
-    let deviations: Vec<f64> = trace
-        .samples
-        .iter()
-        .map(|sample| sample.frequency_hz - 50.0)
-        .collect();
+    let deviations_hz = record::deviations_hz(&root().join(record::PATH))?;
     for source in [
         SourceKind::Deviation,
         SourceKind::Ade7953,
@@ -383,7 +361,7 @@ fn replay(pair: &mut Pair<'_, '_>) -> Result<(), AnyError> {
             warm_up_ticks: None,
             brown_out: false,
         };
-        let outcome = recorded(pair, setup, &deviations)?;
+        let outcome = recorded(pair, setup, &deviations_hz)?;
         tell(&format!("9 August 2019, {source:?}"), &outcome);
     }
     Ok(())
