@@ -1,4 +1,5 @@
-//! The commands of the laboratory: equal numbers in equal questions, and bad input answered by exit code 2.
+//! The commands of the laboratory: equal numbers in equal questions, and bad input answered by exit
+//! code 2.
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on fails")]
 
 use std::path::Path;
@@ -216,7 +217,7 @@ fn the_report_the_runs_and_the_replays_agree() {
     let spec = Spec::load("paper-bi", &[]).unwrap();
     let quiet = |_| Box::new(Quiet) as Box<dyn Watch>;
     let laws = synthesis::synthesise(&spec, &quiet).unwrap();
-    let emitted = pipeline::emit(&spec, &laws, Encoding::Dense, &quiet).unwrap();
+    let emitted = pipeline::emit(&laws, Encoding::Dense, &quiet).unwrap();
     let path = dir.path().join("dense.bin");
     std::fs::write(&path, emitted.bytes).unwrap();
     let table = ["--table", path.to_str().unwrap(), "--json"];

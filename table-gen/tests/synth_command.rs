@@ -81,7 +81,8 @@ fn a_plant_that_outgrows_a_step_is_bad_input() {
     );
 }
 
-/// Without damping, and with a governor that does nothing, A is singular but for 1e-12: the enclosures need no inverse.
+/// Without damping, and with a governor that does nothing, A is singular but for 1e-12: the
+/// enclosures need no inverse.
 #[test]
 fn a_nearly_singular_plant_is_solved() {
     let output = synth(&[

@@ -27,7 +27,7 @@ pub fn synthesised(name: &str, set: &[&str]) -> (Spec, Synthesis) {
 /// The dense table of a spec: the lowest allowed input of each cell, whatever the compression does.
 pub fn dense_of(spec: &Spec) -> Vec<u8> {
     let synthesis = synthesis::synthesise(spec, &unwatched).unwrap();
-    let emitted = pipeline::emit(spec, &synthesis, Encoding::Dense, &unwatched).unwrap();
+    let emitted = pipeline::emit(&synthesis, Encoding::Dense, &unwatched).unwrap();
     emitted.bytes
 }
 

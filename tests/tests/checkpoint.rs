@@ -6,8 +6,8 @@ use std::path::Path;
 use std::time::Duration;
 
 use model::spec::Spec;
+use synth::abstraction::guard::Unguarded;
 use synth::checkpoint::{CheckpointError, Checkpoints};
-use synth::game::guard::Unguarded;
 use synth::game::reach::{reach, reach_lean};
 use synth::game::safety::{safety, safety_lean};
 use synth::game::{GameError, Sweep, Unwatched, Watch};

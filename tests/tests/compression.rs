@@ -7,19 +7,21 @@
 
 use firmware::grid::Cell;
 use firmware::table::{Law, TableView};
-use model::spec::Spec;
-use synth::compress::{self, CompressedLaws, Options, recheck};
+use synth::compress::{CompressedLaws, Options, recheck};
 use synth::emit::{self, dense};
 use synth::game::{NOT_WON, unwatched};
+use synth::pipeline::{self, Encoding};
 use synth::synthesis::{self, Synthesis};
 use tests::testing::{on_threads, synthesised};
 
-fn table(spec: &Spec, synthesis: &Synthesis, exact_domain: bool) -> (Vec<u8>, CompressedLaws) {
+fn table(synthesis: &Synthesis, exact_domain: bool) -> (Vec<u8>, CompressedLaws) {
     let options = Options {
         keep_minimal_time: false,
         exact_domain,
     };
-    compress::table(spec, synthesis, &options, &unwatched).unwrap()
+    let emitted = pipeline::emit(synthesis, Encoding::Tree(options), &unwatched).unwrap();
+    let laws = emitted.laws;
+    (emitted.bytes, CompressedLaws { laws })
 }
 
 fn solved(synthesis: &Synthesis, law: Law) -> &synthesis::SolvedLaw {
@@ -33,7 +35,7 @@ fn solved(synthesis: &Synthesis, law: Law) -> &synthesis::SolvedLaw {
 #[test]
 fn the_reachable_table_is_tiny_sound_and_verified() {
     let (spec, synthesis) = synthesised("paper-bi", &["table.domain=reachable"]);
-    let (bytes, laws) = table(&spec, &synthesis, false);
+    let (bytes, laws) = table(&synthesis, false);
     let parts: u32 = laws
         .laws
         .iter()
@@ -42,7 +44,7 @@ fn the_reachable_table_is_tiny_sound_and_verified() {
     // The goal is 512 bytes; 73 were measured, and a change that doubles them should be noticed.
     assert!(parts <= 146, "{parts} bytes");
     let view = TableView::parse(&bytes).unwrap();
-    let shape = synthesis::grid_shape(&synthesis.grid);
+    let shape = synthesis.problem.shape;
     for law in [Law::C1, Law::C2] {
         let levels = recheck::levels(&shape, view.law(law).unwrap());
         let ranks = &solved(&synthesis, law).solution.ranks;
@@ -56,7 +58,7 @@ fn the_reachable_table_is_tiny_sound_and_verified() {
     // One thread gives the same bytes as all.
     let (alone, _) = on_threads(1, || {
         let synthesis = synthesis::synthesise(&spec, &unwatched).unwrap();
-        table(&spec, &synthesis, false)
+        table(&synthesis, false)
     });
     assert_eq!(alone, bytes);
 }
@@ -64,7 +66,7 @@ fn the_reachable_table_is_tiny_sound_and_verified() {
 #[test]
 fn the_exact_table_answers_every_winning_cell_and_still_wins() {
     let (spec, synthesis) = synthesised("paper-bi", &[]);
-    let (bytes, laws) = table(&spec, &synthesis, true);
+    let (bytes, laws) = table(&synthesis, true);
     let inputs: u32 = laws
         .laws
         .iter()
@@ -72,9 +74,9 @@ fn the_exact_table_answers_every_winning_cell_and_still_wins() {
         .sum();
     assert!(inputs <= 8192, "{inputs} bytes without membership");
     let view = TableView::parse(&bytes).unwrap();
-    let abstraction = synthesis::abstraction(&spec, &synthesis.grid).unwrap();
-    let guard = synthesis::containment_guard(&spec, &synthesis.grid).unwrap();
-    let shape = synthesis::grid_shape(&synthesis.grid);
+    let abstraction = synthesis::abstraction(&synthesis.problem).unwrap();
+    let guard = synthesis::containment_guard(&synthesis.problem);
+    let shape = synthesis.problem.shape;
     for law in &laws.laws {
         let winning = solved(&synthesis, law.law).solution.winning;
         let target = laws.target(law.law);
@@ -95,7 +97,7 @@ fn the_exact_table_answers_every_winning_cell_and_still_wins() {
             &solution,
             &dense::lowest,
         ));
-        let head = emit::head(&spec, synthesis.grid).unwrap();
+        let head = emit::head(&synthesis.problem).unwrap();
         let dense_bytes = emit::assemble(head, &encoded).unwrap();
         let dense_view = TableView::parse(&dense_bytes).unwrap();
         for (index, level) in levels.iter().enumerate() {
@@ -115,13 +117,13 @@ fn the_exact_table_answers_every_winning_cell_and_still_wins() {
 #[test]
 fn one_cell_in_a_hundred_buys_a_table_of_two_kilobytes() {
     let (spec, synthesis) = synthesised("paper-bi", &[]);
-    let (bytes, laws) = table(&spec, &synthesis, false);
+    let (bytes, laws) = table(&synthesis, false);
     // Goals: 10 KB, membership included, and 32 visits; 2,152 bytes and 21 visits were measured.
     assert!(bytes.len() <= 4096, "{} bytes", bytes.len());
     let view = TableView::parse(&bytes).unwrap();
-    let abstraction = synthesis::abstraction(&spec, &synthesis.grid).unwrap();
-    let guard = synthesis::containment_guard(&spec, &synthesis.grid).unwrap();
-    let shape = synthesis::grid_shape(&synthesis.grid);
+    let abstraction = synthesis::abstraction(&synthesis.problem).unwrap();
+    let guard = synthesis::containment_guard(&synthesis.problem);
+    let shape = synthesis.problem.shape;
     let c1 = recheck::levels(&shape, view.law(Law::C1).unwrap());
     for law in &laws.laws {
         let solved = solved(&synthesis, law.law);

@@ -10,17 +10,17 @@ use firmware::table::{
 use firmware::units::State;
 use lab::simulation::closed_loop::{self, Estimator};
 use lab::simulation::scenario::Scenario;
-use model::plant::GridPlant;
+use model::plant::Plant;
 use model::propagator::Propagator;
 use model::spec::Spec;
 use synth::emit::{self, EncodedLaw};
-use synth::synthesis;
+use synth::problem::Problem;
 use tests::testing::load;
 
 /// A table that answers the trigger, and every state of the grid after it, with one level.
 fn always(spec: &Spec, level: u8) -> Vec<u8> {
-    let grid = synthesis::device_grid(spec).unwrap();
-    let head = emit::head(spec, grid).unwrap();
+    let problem = Problem::new(spec).unwrap();
+    let (grid, head) = (problem.grid, emit::head(&problem).unwrap());
     let bits = bits_per_entry(head.header.levels) as usize;
     let mut inputs = vec![0u8; DENSE_HEADER_LEN + (grid.cells() as usize * bits).div_ceil(8)];
     for (axis, count) in grid.count().iter().enumerate() {
@@ -149,7 +149,7 @@ fn the_device_predicts_what_the_grid_becomes() {
     );
     // A fall with commands under way: the loop's own memory must be what a prediction from outside
     // would use.
-    let plant = GridPlant::new(&spec);
+    let plant = Plant::new(&spec);
     let step = Propagator::new(&plant, 0.1);
     let mut control = ControlLoop::new(&bytes);
     let mut history = firmware::prediction::History::NONE;

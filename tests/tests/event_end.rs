@@ -15,7 +15,7 @@ use firmware::phase::{Decision, Phase, PhaseState};
 use firmware::prediction::History;
 use firmware::table::TableView;
 use firmware::units::State;
-use model::plant::GridPlant;
+use model::plant::Plant;
 use model::propagator::Propagator;
 use synth::delay::Delay;
 use tests::stand_in;
@@ -60,7 +60,7 @@ fn run_late(
         brown_out: false,
     };
     assert_eq!(session.handle(&Request::Start(setup)), Response::Done);
-    let plant = GridPlant::new(&load("paper-bi", &[]));
+    let plant = Plant::new(&load("paper-bi", &[]));
     assert_eq!(plant.fleet, FLEET_GW);
     let grid = Propagator::new(&plant, TICK_S);
     let mut x = [0.0_f64; 4];

@@ -10,14 +10,14 @@ use lab::record::RecordSample;
 use lab::simulation::baseline;
 use lab::simulation::beyond::Disturbances;
 use lab::simulation::beyond::file::ScenarioFile;
-use lab::simulation::beyond::grid::BeyondGrid;
 use lab::simulation::beyond::plant::BeyondPlant;
+use lab::simulation::beyond::system::BeyondSystem;
 use lab::simulation::closed_loop::{ClosedLoop, Estimator};
 use lab::simulation::monte_carlo::draws::Draws;
 use lab::simulation::monte_carlo::{self, Statistics};
 use lab::simulation::recorder::History;
 use lab::simulation::scenario::Scenario;
-use model::plant::GridPlant;
+use model::plant::Plant;
 use model::spec::Spec;
 use tests::testing::{dense, on_threads, recorded_2019};
 
@@ -95,9 +95,9 @@ fn without_limits_the_integrated_plant_is_the_exact_one() {
     let (mut exact, mut integrated) = (History::default(), History::default());
     closed_loop.run(&scenario, &mut exact);
     let disturbances = Disturbances::step(scenario.loss_gw);
-    let plant = BeyondPlant::new(GridPlant::new(spec), &disturbances, 11.0, 0);
+    let plant = BeyondPlant::new(Plant::new(spec), &disturbances, 11.0, 0);
     let (_, parts) = closed_loop.parts(&scenario);
-    let mut grid = BeyondGrid::new(plant, parts, scenario.initial);
+    let mut grid = BeyondSystem::new(plant, parts, scenario.initial);
     closed_loop.run_on(&mut grid, &scenario, &mut integrated);
     for (a, b) in exact.samples.iter().zip(&integrated.samples) {
         for axis in 0..4 {
@@ -246,7 +246,7 @@ fn the_record_of_2019_is_explained_and_answered() {
     let first = last - 20;
     let f_mean_hz = mean(&(first..last).map(f_hz).collect::<Vec<_>>());
     let slope_hz_per_s = (f_hz(last) - f_hz(first)) / 20.0;
-    let plant = GridPlant::new(spec);
+    let plant = Plant::new(spec);
     let expected_gw = FEW_DRAWS.governor_max_gw
         - plant.damping * f_mean_hz
         - 2.0 * plant.inertia * slope_hz_per_s;

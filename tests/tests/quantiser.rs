@@ -4,7 +4,7 @@
 use firmware::grid::{Cell, Grid};
 use firmware::units::State;
 use model::spec::Spec;
-use synth::synthesis;
+use synth::problem::Problem;
 
 /// Walks every edge of every axis of a grid, the other axes held at a point inside.
 fn edges(grid: &Grid) {
@@ -44,7 +44,7 @@ fn edges(grid: &Grid) {
 fn every_boundary_of_the_shipped_grids() {
     for name in Spec::shipped_names() {
         let spec = Spec::load(name, &[]).unwrap();
-        edges(&synthesis::device_grid(&spec).unwrap());
+        edges(&Problem::new(&spec).unwrap().grid);
     }
 }
 

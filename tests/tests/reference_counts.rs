@@ -6,13 +6,14 @@
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on fails")]
 
 use model::interval::Interval;
-use model::plant::GridPlant;
+use model::plant::Plant;
 use synth::abstraction::affine::{AffineAbstraction, AffineInput, Growth};
+use synth::abstraction::guard::Unguarded;
 use synth::game::Unwatched;
 use synth::game::bitset::BitSet;
-use synth::game::guard::Unguarded;
 use synth::game::reach::reach;
 use synth::game::safety::safety;
+use synth::problem::Problem;
 use synth::synthesis::{self, Synthesis};
 use tests::testing::{load, synthesised};
 
@@ -23,10 +24,10 @@ fn winning(synthesis: &Synthesis) -> [usize; 2] {
 
 #[test]
 fn bidirectional_without_containment() {
-    let (spec, synthesis) = synthesised("paper-bi", &["requirements.containment_hz=none"]);
-    assert_eq!(synthesis.grid.cells(), 2_358_443);
+    let (_, synthesis) = synthesised("paper-bi", &["requirements.containment_hz=none"]);
+    assert_eq!(synthesis.problem.grid.cells(), 2_358_443);
     assert_eq!(winning(&synthesis), [1_075_271, 1_382_894]);
-    let abstraction = synthesis::abstraction(&spec, &synthesis.grid).unwrap();
+    let abstraction = synthesis::abstraction(&synthesis.problem).unwrap();
     let transitions = synthesis::count_transitions(&abstraction);
     // The oracle has four digits: 1.352e9.
     assert_eq!((transitions as f64 / 1e6).round(), 1352.0);
@@ -41,7 +42,7 @@ fn bidirectional_with_containment() {
 #[test]
 fn unidirectional_as_printed_without_containment() {
     // The paper's bounds as printed, at the period of the bidirectional row.
-    let (spec, synthesis) = synthesised(
+    let (_, synthesis) = synthesised(
         "paper-uni",
         &[
             "requirements.containment_hz=none",
@@ -49,9 +50,9 @@ fn unidirectional_as_printed_without_containment() {
             "sampling.period_s=1.5",
         ],
     );
-    assert_eq!(synthesis.grid.cells(), 2_358_443);
+    assert_eq!(synthesis.problem.grid.cells(), 2_358_443);
     assert_eq!(winning(&synthesis), [467_763, 583_097]);
-    let abstraction = synthesis::abstraction(&spec, &synthesis.grid).unwrap();
+    let abstraction = synthesis::abstraction(&synthesis.problem).unwrap();
     let transitions = synthesis::count_transitions(&abstraction);
     assert_eq!((transitions as f64 / 1e6).round(), 1341.0);
 }
@@ -90,9 +91,9 @@ fn robust(row: &Robust, cap: bool) -> [usize; 2] {
         &format!("uncertainty.loss_gw={:?}", row.loss),
     ];
     let spec = load("paper-bi", &overrides);
-    let grid = synthesis::device_grid(&spec).unwrap();
-    let shape = synthesis::grid_shape(&grid);
-    let (a, b) = GridPlant::new(&spec).matrices();
+    let problem = Problem::new(&spec).unwrap();
+    let shape = problem.shape;
+    let (a, b) = Plant::new(&spec).matrices();
     let fleet = spec.fleet_power_gw() * 1e6;
     let inputs: Vec<_> = (0..spec.input.levels())
         .map(|level| {
@@ -102,7 +103,7 @@ fn robust(row: &Robust, cap: bool) -> [usize; 2] {
                 fleet * 1.1 * u - row.loss[0] * 1e6,
             );
             let drive = if cap {
-                synthesis::net_power(&spec, level)
+                synth::drives::net_power(&spec, level)
             } else {
                 uncapped
             };

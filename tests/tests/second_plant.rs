@@ -5,8 +5,8 @@
 use nalgebra::{DMatrix, DVector};
 use synth::abstraction::Abstraction;
 use synth::abstraction::growth::{GrowthAbstraction, GrowthBound};
+use synth::abstraction::guard::Unguarded;
 use synth::game::bitset::BitSet;
-use synth::game::guard::Unguarded;
 use synth::game::{Unwatched, safety::safety};
 use synth::yardsticks::boost_converter::{self, PERIOD_S};
 use tests::reference::SlowGame;

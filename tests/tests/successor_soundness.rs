@@ -7,15 +7,16 @@
 //! that.
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on fails")]
 
-use model::plant::GridPlant;
+use model::plant::Plant;
 use model::propagator::Propagator;
 use model::spec::Spec;
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 use synth::abstraction::Abstraction;
 use synth::abstraction::affine::AffineInput;
+use synth::abstraction::guard::Guard;
 use synth::abstraction::tube::TubeGuard;
-use synth::game::guard::Guard;
+use synth::problem::Problem;
 use synth::synthesis;
 use tests::testing::load;
 
@@ -81,7 +82,7 @@ struct Trial<'t> {
 
 impl<'t> Trial<'t> {
     fn new(spec: &'t Spec, pieces: usize) -> Self {
-        let plant = GridPlant::new(spec);
+        let plant = Plant::new(spec);
         Self {
             spec,
             step: Propagator::new(&plant, spec.sampling.period_s / pieces as f64),
@@ -113,8 +114,8 @@ fn no_successor_escapes_its_box() {
     let mut random = Random::new();
     let mut checked = 0u32;
     for spec in specs() {
-        let grid = synthesis::device_grid(&spec).unwrap();
-        let abstraction = synthesis::abstraction(&spec, &grid).unwrap();
+        let problem = Problem::new(&spec).unwrap();
+        let abstraction = synthesis::abstraction(&problem).unwrap();
         let shape = *abstraction.shape();
         let trial = Trial::new(&spec, PIECES);
         for _ in 0..2_000_000 {
@@ -154,14 +155,13 @@ fn no_trajectory_leaves_the_band_of_a_guard() {
     let mut random = Random::new();
     let mut checked = 0u32;
     for spec in specs() {
-        let grid = synthesis::device_grid(&spec).unwrap();
-        let shape = synthesis::grid_shape(&grid);
-        let (a, b) = GridPlant::new(&spec).matrices();
+        let shape = Problem::new(&spec).unwrap().shape;
+        let (a, b) = Plant::new(&spec).matrices();
         let inputs: Vec<_> = (0..spec.input.levels())
             .map(|level| AffineInput {
                 a,
                 b,
-                drive: synthesis::net_power(&spec, level),
+                drive: synth::drives::net_power(&spec, level),
             })
             .collect();
         let trial = Trial::new(&spec, FINE);

@@ -5,8 +5,8 @@
 use model::interval::Interval;
 use synth::abstraction::Abstraction;
 use synth::abstraction::growth::{GrowthAbstraction, GrowthBound};
+use synth::abstraction::guard::Unguarded;
 use synth::abstraction::invariant::InvariantPlant;
-use synth::game::guard::Unguarded;
 use synth::game::inputs::InputSet;
 use synth::game::{NOT_WON, Unwatched, reach::reach, safety::safety};
 use synth::yardsticks::{boost_converter, two_areas, unicycle};

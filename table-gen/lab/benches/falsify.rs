@@ -1,4 +1,5 @@
-//! The falsifier against every shipped spec's table: at least 10^7 control steps each, and no violation.
+//! The falsifier against every shipped spec's table: at least 10^7 control steps each, and no
+//! violation.
 //!
 //! `cargo bench -p lab --bench falsify`. The tables are made here as `build` makes them.
 
@@ -23,9 +24,7 @@ fn main() {
         let spec = Spec::load(name, &[]).unwrap();
         let laws = synthesis::synthesise(&spec, &unwatched).unwrap();
         let encoding = pipeline::Encoding::default();
-        let bytes = pipeline::emit(&spec, &laws, encoding, &unwatched)
-            .unwrap()
-            .bytes;
+        let bytes = pipeline::emit(&laws, encoding, &unwatched).unwrap().bytes;
         let start = Instant::now();
         let found = falsify(&bytes, &spec, STEPS, 2024).unwrap();
         if let Some(violation) = found.violation {

@@ -8,10 +8,10 @@
 //! | [`record`] | a recorded frequency as text | samples at one interval |
 //! | [`compare`] | a table | a scorecard: no response, droop, table and the limit side by side |
 //! | [`replay`] | a recorded frequency | what the firmware would have done |
-//! | [`falsify`] | a table and a spec | a real trajectory that breaks a claim, if a search finds one |
+//! | [`falsify`] | a table and a spec | a real trajectory that breaks a claim |
 //! | [`counterfactual`] | a recorded event | what it would have been with the chargers |
 //! | [`robustness`] | a temporal formula and a trace | true or false, and by how much |
-//! | [`monitor`] | a charger's telemetry | lines for a person |
+//! | [`telemetry_lines`] | a charger's telemetry | lines for a person |
 //! | [`report`] | runs and findings | one HTML page and its figures |
 #![forbid(unsafe_code)]
 
@@ -20,9 +20,9 @@ pub mod compare;
 pub mod counterfactual;
 pub mod falsify;
 pub mod fleet;
-pub mod monitor;
 pub mod record;
 pub mod replay;
 pub mod report;
 pub mod robustness;
 pub mod simulation;
+pub mod telemetry_lines;

@@ -1,12 +1,13 @@
 //! Formula on a trace: how far it is from being true or false.
 //!
-//! The robustness of an atom is the distance of the signal from the atom's edge, positive inside: Hz for f, GW for the
-//! loss. Not is minus, and and always are the least, or and eventually the greatest (Donzé and Maler's semantics). A
-//! positive value means true, a negative one false, and a trace that differs by less than its magnitude everywhere has
-//! the same answer.
+//! The robustness of an atom is the distance of the signal from the atom's edge, positive inside:
+//! Hz for f, GW for the loss. Not is minus, and and always are the least, or and eventually the
+//! greatest (Donzé and Maler's semantics). A positive value means true, a negative one false, and a
+//! trace that differs by less than its magnitude everywhere has the same answer.
 //!
-//! A trace is a finite list of samples; time ends with it. So "always" speaks of the samples there are, "eventually" must
-//! happen on the trace, and between samples nothing is claimed (the verifier does that).
+//! A trace is a finite list of samples; time ends with it. So "always" speaks of the samples there
+//! are, "eventually" must happen on the trace, and between samples nothing is claimed (the verifier
+//! does that).
 
 use model::logic::{Comparison, Formula, Interval, Signal};
 
@@ -23,7 +24,7 @@ pub struct Sample {
 
 /// Why a formula has no value on a trace.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub enum MonitorError {
+pub enum RobustnessError {
     /// No sample.
     #[error("the trace has no sample")]
     Empty,
@@ -49,33 +50,34 @@ pub fn robustness(
     formula: &Formula,
     trace: &[Sample],
     named: &[(&str, [f64; 2])],
-) -> Result<f64, MonitorError> {
+) -> Result<f64, RobustnessError> {
     check(trace)?;
-    let values = Monitor { trace, named }.values(formula)?;
-    values.first().copied().ok_or(MonitorError::Empty)
+    let values = Evaluation { trace, named }.values(formula)?;
+    values.first().copied().ok_or(RobustnessError::Empty)
 }
 
-fn check(trace: &[Sample]) -> Result<(), MonitorError> {
+fn check(trace: &[Sample]) -> Result<(), RobustnessError> {
     if trace.is_empty() {
-        return Err(MonitorError::Empty);
+        return Err(RobustnessError::Empty);
     }
     for (index, sample) in trace.iter().enumerate() {
         let ordered = index == 0 || trace[index - 1].time_s < sample.time_s;
         if !(ordered && sample.time_s.is_finite() && sample.f_hz.is_finite()) {
-            return Err(MonitorError::BadSample { index });
+            return Err(RobustnessError::BadSample { index });
         }
     }
     Ok(())
 }
 
-struct Monitor<'a> {
+struct Evaluation<'a> {
     trace: &'a [Sample],
     named: &'a [(&'a str, [f64; 2])],
 }
 
-impl Monitor<'_> {
-    /// Robustness at every sample. The depth of the recursion is that of the formula, which the parser bounds.
-    fn values(&self, formula: &Formula) -> Result<Vec<f64>, MonitorError> {
+impl Evaluation<'_> {
+    /// Robustness at every sample. The depth of the recursion is that of the formula, which the
+    /// parser bounds.
+    fn values(&self, formula: &Formula) -> Result<Vec<f64>, RobustnessError> {
         Ok(match formula {
             Formula::True => vec![f64::INFINITY; self.trace.len()],
             Formula::Compare(signal, comparison, value) => {
@@ -111,24 +113,24 @@ impl Monitor<'_> {
         a: &Formula,
         b: &Formula,
         join: impl Fn(f64, f64) -> f64,
-    ) -> Result<Vec<f64>, MonitorError> {
+    ) -> Result<Vec<f64>, RobustnessError> {
         let (a, b) = (self.values(a)?, self.values(b)?);
         Ok(a.into_iter().zip(b).map(|(a, b)| join(a, b)).collect())
     }
 
-    fn signal(&self, signal: Signal) -> Result<Vec<f64>, MonitorError> {
+    fn signal(&self, signal: Signal) -> Result<Vec<f64>, RobustnessError> {
         let value = |sample: &Sample| match signal {
             Signal::Frequency => sample.f_hz,
             Signal::Loss => sample.loss_gw,
         };
         let values: Vec<f64> = self.trace.iter().map(value).collect();
         match values.iter().position(|v| v.is_nan()) {
-            Some(index) => Err(MonitorError::BadSample { index }),
+            Some(index) => Err(RobustnessError::BadSample { index }),
             None => Ok(values),
         }
     }
 
-    fn ends(&self, interval: &Interval) -> Result<[f64; 2], MonitorError> {
+    fn ends(&self, interval: &Interval) -> Result<[f64; 2], RobustnessError> {
         match interval {
             Interval::Ends(low, high) => Ok([*low, *high]),
             Interval::Named(name) => self
@@ -136,11 +138,12 @@ impl Monitor<'_> {
                 .iter()
                 .find(|(known, _)| known == name)
                 .map(|(_, ends)| *ends)
-                .ok_or_else(|| MonitorError::UnknownInterval { name: name.clone() }),
+                .ok_or_else(|| RobustnessError::UnknownInterval { name: name.clone() }),
         }
     }
 
-    /// Greatest value from each sample on, within so long: a sliding window from the end, linear in the trace.
+    /// Greatest value from each sample on, within so long: a sliding window from the end, linear in
+    /// the trace.
     fn greatest(&self, values: &[f64], within_s: Option<f64>) -> Vec<f64> {
         let mut out = vec![f64::NEG_INFINITY; values.len()];
         // Indices of the window whose values descend towards its far end.
@@ -226,17 +229,17 @@ mod tests {
     #[test]
     fn bad_traces_and_names_are_errors() {
         let formula = parse("G(f in I9)").unwrap();
-        assert_eq!(robustness(&formula, &[], &[]), Err(MonitorError::Empty));
+        assert_eq!(robustness(&formula, &[], &[]), Err(RobustnessError::Empty));
         assert!(matches!(
             robustness(&formula, &trace(&[0.0]), &[]),
-            Err(MonitorError::UnknownInterval { .. })
+            Err(RobustnessError::UnknownInterval { .. })
         ));
         let mut disordered = trace(&[0.0, 0.0]);
         disordered[1].time_s = 0.0;
         let formula = parse("G(f >= 0)").unwrap();
         assert_eq!(
             robustness(&formula, &disordered, &[]),
-            Err(MonitorError::BadSample { index: 1 })
+            Err(RobustnessError::BadSample { index: 1 })
         );
     }
 

@@ -102,8 +102,8 @@ fn what_is_wrong_is_named_by_its_line() {
     refused("sixty-hertz", &plain, 2, &["45 to 55", "--nominal-hz 60"]);
     refused("more-columns", &plain, 1, &["none is known as the time"]);
     refused("more-columns", &by_columns("when,f9"), 1, &["f9"]);
-    // 50.013 Hz read as 50.013 mHz from nominal would be a steady 50.05 Hz: in range, and wrong, but
-    // asked for. Read as Hz from nominal it is out of range.
+    // 50.013 Hz read as 50.013 mHz from nominal would be a steady 50.05 Hz: in range, and wrong,
+    // but asked for. Read as Hz from nominal it is out of range.
     refused("dtm", &by_columns("1,2:dHz"), 2, &["50.013", "-5 to 5"]);
 }
 

@@ -15,7 +15,8 @@ pub struct Budget {
     pub laws: Vec<LawBudget>,
     /// What was measured on the reference core.
     pub measured: Measured,
-    /// Flash left on each microcontroller of the list, the code not counted: its size depends on the core.
+    /// Flash left on each microcontroller of the list, the code not counted: its size depends on
+    /// the core.
     pub rooms: Vec<Room>,
 }
 
@@ -39,7 +40,8 @@ pub struct LawBudget {
 pub struct Measured {
     /// Code and constants of the charger without a HAL, the reader among them \[bytes\].
     pub core_bytes: Option<u64>,
-    /// Instructions of the worst lookup, quantiser included; only of the very table that was measured.
+    /// Instructions of the worst lookup, quantiser included; only of the very table that was
+    /// measured.
     pub lookup_instructions: Option<u64>,
 }
 

@@ -1,12 +1,12 @@
 //! Enclosures of the flow of a linear system `x' = A x + b v`.
 //!
-//! With `v` constant, `x(t) = Φ(t) x(0) + Γ(t) v`, where Φ(t) = exp(A t) and Γ(t) = ∫ exp(A s) b ds. Both are blocks of
-//! one exponential, `exp([A b; 0 0] t) = [Φ Γ; 0 1]`. With `v` varying in time within ±r, the state moves by at most
-//! `r ∫ |exp(A s) b| ds` on each axis.
+//! With `v` constant, `x(t) = Φ(t) x(0) + Γ(t) v`, where Φ(t) = exp(A t) and Γ(t) = ∫ exp(A s) b
+//! ds. Both are blocks of one exponential, `exp([A b; 0 0] t) = [Φ Γ; 0 1]`. With `v` varying in
+//! time within ±r, the state moves by at most `r ∫ |exp(A s) b| ds` on each axis.
 //!
-//! The exponential is computed in interval arithmetic by scaling, Taylor series and squaring, with the series'
-//! remainder added: for ‖M‖ <= 1/2 the terms past n are below `‖M‖^(n+1)/(n+1)! · 1/(1 - ‖M‖/(n+2))`, which is at most
-//! twice its first factor.
+//! The exponential is computed in interval arithmetic by scaling, Taylor series and squaring, with
+//! the series' remainder added: for ‖M‖ <= 1/2 the terms past n are below `‖M‖^(n+1)/(n+1)! · 1/(1
+//! - ‖M‖/(n+2))`, which is at most twice its first factor.
 
 use crate::interval::Interval;
 
@@ -19,8 +19,8 @@ pub type Vector<const D: usize> = [Interval; D];
 const TERMS: u32 = 16;
 /// Norm to which the matrix is scaled before the series.
 const NORM_MAX: f64 = 0.5;
-/// Pieces in which the interval of integration is cut where an absolute value is integrated; a power of two, so that
-/// their length is exact.
+/// Pieces in which the interval of integration is cut where an absolute value is integrated; a
+/// power of two, so that their length is exact.
 const PIECES: u32 = 256;
 
 /// Φ and Γ at one time.
@@ -83,8 +83,8 @@ impl<const D: usize> Flow<D> {
         let mut factor = 1.0f64;
         for n in 1..=TERMS {
             let scale = step / Interval::point(f64::from(n));
-            // term_n = M term_{n-1} / n with M = [A b; 0 0] step. Past the first term the last row of the term is zero,
-            // so b enters only once.
+            // term_n = M term_{n-1} / n with M = [A b; 0 0] step. Past the first term the last row
+            // of the term is zero, so b enters only once.
             let mut phi = product(a, &term.phi);
             let mut gamma = apply(a, &term.gamma);
             if n == 1 {
@@ -122,8 +122,9 @@ impl<const D: usize> Flow<D> {
 
 /// Upper bound of `∫₀ᵗ |exp(A s) b| ds` on each axis.
 ///
-/// The interval is cut into pieces. Where the integrand keeps its sign on a piece, the piece's share is the difference
-/// of Γ, exactly; elsewhere it is the piece's length times the largest magnitude.
+/// The interval is cut into pieces. Where the integrand keeps its sign on a piece, the piece's
+/// share is the difference of Γ, exactly; elsewhere it is the piece's length times the largest
+/// magnitude.
 pub fn absolute_integral<const D: usize>(a: &Matrix<D>, b: &Vector<D>, time_s: f64) -> [f64; D] {
     let length = time_s / f64::from(PIECES);
     let step = Flow::over(a, b, length);
@@ -147,7 +148,8 @@ pub fn absolute_integral<const D: usize>(a: &Matrix<D>, b: &Vector<D>, time_s: f
     sum
 }
 
-/// Upper bound of `∫ |exp(A s) b| ds` from one time to a later one \[s\] on each axis; zero if the second is not later.
+/// Upper bound of `∫ |exp(A s) b| ds` from one time to a later one \[s\] on each axis; zero if the
+/// second is not later.
 pub fn absolute_integral_between<const D: usize>(
     a: &Matrix<D>,
     b: &Vector<D>,
@@ -178,11 +180,13 @@ pub fn largest<const D: usize>(a: &Matrix<D>, time_s: f64) -> [[f64; D]; D] {
     out
 }
 
-/// Enclosure of exp(A s) for all s in `[0, length_s]`: `I + A [0, h] + remainder`, with ‖A h‖ below 1/2.
+/// Enclosure of exp(A s) for all s in `[0, length_s]`: `I + A [0, h] + remainder`, with ‖A h‖ below
+/// 1/2.
 pub fn tube<const D: usize>(a: &Matrix<D>, length_s: f64) -> Matrix<D> {
     let zero = [Interval::ZERO; D];
     let span = norm(a, &zero) * length_s;
-    // exp(x) - 1 - x <= x² for 0 <= x <= 1; past that the bound exp(x) is used, which is crude but valid.
+    // exp(x) - 1 - x <= x² for 0 <= x <= 1; past that the bound exp(x) is used, which is crude but
+    // valid.
     let rest = if span <= 1.0 {
         (span * span).next_up()
     } else {
@@ -242,8 +246,8 @@ pub fn apply<const D: usize>(a: &Matrix<D>, x: &Vector<D>) -> Vector<D> {
     out
 }
 
-/// The Metzler matrix of A: diagonal as it is, magnitudes elsewhere. Its exponential bounds `|exp(A t)|` (SCOTS' growth
-/// bound of a linear system).
+/// The Metzler matrix of A: diagonal as it is, magnitudes elsewhere. Its exponential bounds `|exp(A
+/// t)|` (SCOTS' growth bound of a linear system).
 pub fn metzler<const D: usize>(a: &Matrix<D>) -> Matrix<D> {
     let mut out = *a;
     for (i, row) in out.iter_mut().enumerate() {
@@ -281,7 +285,8 @@ mod tests {
             for i in 0..4 {
                 for j in 0..4 {
                     let entry = flow.phi[i][j];
-                    // The library claims about 1e-15 relative to the norm (at most 10 here); ours must be that tight.
+                    // The library claims about 1e-15 relative to the norm (at most 10 here); ours
+                    // must be that tight.
                     assert!(entry.high - entry.low < 1e-11, "{time} {i} {j} {entry:?}");
                     assert!((library[(i, j)] - entry.mid()).abs() < 1e-12);
                 }
@@ -331,7 +336,8 @@ mod tests {
         let b = [Interval::ZERO, Interval::ONE];
         let time = std::f64::consts::TAU;
         let bound = absolute_integral(&a, &b, time);
-        // A piece that holds a sign change is overestimated by at most its length times its largest value, 2 (2π/256)².
+        // A piece that holds a sign change is overestimated by at most its length times its largest
+        // value, 2 (2π/256)².
         assert!(bound[0] >= 4.0 - 1e-12 && bound[0] < 4.0 + 3.0 * (time / 256.0).powi(2) * 2.0);
         assert!(Flow::over(&a, &b, time).gamma[0].magnitude() < 1e-10);
     }

@@ -1,12 +1,14 @@
-//! Closed intervals with outward rounding: the arithmetic in which everything that a proof rests on is computed.
+//! Closed intervals with outward rounding: the arithmetic in which everything that a proof rests on
+//! is computed.
 //!
-//! An IEEE operation rounds to nearest, so its result is within one step of the exact one; moving the lower end one
-//! step down and the upper one step up makes the interval contain every exact result. The cost does not matter here:
-//! intervals build the coefficients of an abstraction, once.
+//! An IEEE operation rounds to nearest, so its result is within one step of the exact one; moving
+//! the lower end one step down and the upper one step up makes the interval contain every exact
+//! result. The cost does not matter here: intervals build the coefficients of an abstraction, once.
 
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
-/// A number type in which the plant's equations can be evaluated: `f64` for simulation, [`Interval`] for proofs.
+/// A number type in which the plant's equations can be evaluated: `f64` for simulation,
+/// [`Interval`] for proofs.
 pub trait Scalar:
     Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> + Div<Output = Self>
 {
@@ -199,8 +201,9 @@ mod tests {
     use proptest::prelude::*;
 
     proptest! {
-        /// The exact result of an operation on doubles is compared through 128-bit integers: small whole numbers over a
-        /// power of two are exact in f64, and so are their sums and products in i128.
+        /// The exact result of an operation on doubles is compared through 128-bit integers: small
+        /// whole numbers over a power of two are exact in f64, and so are their sums and products
+        /// in i128.
         #[test]
         fn operations_enclose_exact_results(a in -(1i64<<52)..(1i64<<52), b in -(1i64<<52)..(1i64<<52)) {
             let (x, y) = (Interval::point(a as f64), Interval::point(b as f64));

@@ -1,4 +1,5 @@
-//! What every host package of Holdfast starts from: the specification, the plant, and rigorous arithmetic.
+//! What every host package of Holdfast starts from: the specification, the plant, and rigorous
+//! arithmetic.
 //!
 //! | module | turns | into |
 //! |---|---|---|
@@ -9,6 +10,7 @@
 //! | [`interval`], [`flow`] | the equations | enclosures of the flow over a time |
 //! | [`table_fields`] | a spec | plant, droop, hypotheses and response in a table's whole numbers |
 //! | [`grid_shape`] | a grid of cells | cell numbers |
+//! | [`hex`] | bytes | what people read |
 //! | [`budget`] | a table | bytes, visits and flash left, as data |
 //! | [`verdict`] | a proof or its failure | what commands and report show |
 #![forbid(unsafe_code)]
@@ -16,6 +18,7 @@
 pub mod budget;
 pub mod flow;
 pub mod grid_shape;
+pub mod hex;
 pub mod interval;
 pub mod logic;
 pub mod plant;

@@ -1,12 +1,13 @@
-//! The grid: one definition of the equations (the paper's equation 5, states in the order f, g, l, p).
+//! The grid: one definition of the equations (the paper's equation 5, states in the order f, g, l,
+//! p).
 //!
 //! ```text
 //! f' = (p + P u - w - D f) / 2H          g' = (K f - g) / T_G        K = 1/R_eq
 //! l' = (g + T_1 g' - l) / T_2            p' = (l - p) / T_t
 //! ```
 //!
-//! Units: f in Hz, powers in GW, times in s. The matrices of every other module are read off [`GridPlant::derivative`],
-//! which is evaluated in `f64` or in intervals.
+//! Units: f in Hz, powers in GW, times in s. The matrices of every other module are read off
+//! [`Plant::derivative`], which is evaluated in `f64` or in intervals.
 
 use crate::flow::{Matrix, Vector};
 use crate::interval::{Interval, Scalar};
@@ -17,7 +18,7 @@ pub const STATES: usize = firmware::units::STATES;
 
 /// Parameters of the grid model.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct GridPlant {
+pub struct Plant {
     /// K = 1/R_eq \[GW/Hz\], negative.
     pub governor_gain: f64,
     /// T_G \[s\].
@@ -36,7 +37,7 @@ pub struct GridPlant {
     pub fleet: f64,
 }
 
-impl GridPlant {
+impl Plant {
     /// The plant of a spec.
     pub fn new(spec: &Spec) -> Self {
         Self {

@@ -1,11 +1,11 @@
 //! The exact discrete step of the linear plant for a net power that is constant over the step.
 //!
-//! `x(t + h) = Φ x(t) + Γ v` with both blocks from one matrix exponential (nalgebra's). Plain f64: simulation, not
-//! proof.
+//! `x(t + h) = Φ x(t) + Γ v` with both blocks from one matrix exponential (nalgebra's). Plain f64:
+//! simulation, not proof.
 
 use nalgebra::SMatrix;
 
-use crate::plant::{GridPlant, STATES};
+use crate::plant::{Plant, STATES};
 
 /// States and the drive.
 const AUGMENTED: usize = STATES + 1;
@@ -19,7 +19,7 @@ pub struct Propagator {
 
 impl Propagator {
     /// The step of a plant over a time \[s\].
-    pub fn new(plant: &GridPlant, time_s: f64) -> Self {
+    pub fn new(plant: &Plant, time_s: f64) -> Self {
         let (a, b) = plant.matrices_f64();
         let mut augmented = SMatrix::<f64, AUGMENTED, AUGMENTED>::zeros();
         for i in 0..STATES {

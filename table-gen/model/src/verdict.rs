@@ -17,7 +17,8 @@ pub struct Verdict {
     pub spec: String,
     /// The claims, each with the bound that was found.
     pub claims: Vec<Claim>,
-    /// Distinct cells (with their phase, where sets were carried in time) in which a decision can be made.
+    /// Distinct cells (with their phase, where sets were carried in time) in which a decision can
+    /// be made.
     pub reachable_cells: u64,
     /// For a claim that does not hold: how it fails.
     pub counterexample: Option<Counterexample>,
@@ -159,11 +160,11 @@ pub struct Counterexample {
     pub claim: ClaimName,
     /// What happens.
     pub what: String,
-    /// The sets that lead there. They contain every real trajectory, so without a real one the claim
-    /// is open.
+    /// The sets that lead there. They contain every real trajectory, so without a real one the
+    /// claim is open.
     pub path: Vec<ShownStep>,
-    /// A real trajectory that breaks the claim, with the firmware's control loop; absent if none was
-    /// found, and the claim is then not proven rather than refuted.
+    /// A real trajectory that breaks the claim, with the firmware's control loop; absent if none
+    /// was found, and the claim is then not proven rather than refuted.
     pub real: Option<RealPath>,
 }
 

@@ -9,8 +9,8 @@
 //! | `signature` | Ed25519 over the format's name, a zero byte and the table's bytes, in Base64 |
 //!
 //! The key in the container names the signer; whoever receives it decides by a key of his own. The
-//! charger's firmware does not read containers: whatever receives the message on the charging station
-//! checks it and writes the table's sector.
+//! charger's firmware does not read containers: whatever receives the message on the charging
+//! station checks it and writes the table's sector.
 
 use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;

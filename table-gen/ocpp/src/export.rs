@@ -16,8 +16,8 @@ use crate::messages::{
     SetDerControl,
 };
 
-/// A frequency that no grid runs at \[Hz\]: the gate's upper end. The charger does not answer a rise,
-/// and its way back has no upper bound.
+/// A frequency that no grid runs at \[Hz\]: the gate's upper end. The charger does not answer a
+/// rise, and its way back has no upper bound.
 pub(crate) const NEVER_HZ: f64 = 55.0;
 /// EN 50160: 230 V and 10 % either way \[V\]. The charger itself does not look at the voltage.
 const VOLTAGE_V: [f64; 2] = [207.0, 253.0];

@@ -1,8 +1,8 @@
 //! Messages to a fallback.
 //!
-//! Read are a call as OCPP-J sends it, its payload alone, a charging profile alone, or a list of any
-//! of them. What the charger cannot do is refused with the field's name if it changes the droop, and
-//! named in [`Imported::not_taken`] if it is about the way back.
+//! Read are a call as OCPP-J sends it, its payload alone, a charging profile alone, or a list of
+//! any of them. What the charger cannot do is refused with the field's name if it changes the
+//! droop, and named in [`Imported::not_taken`] if it is about the way back.
 
 use firmware::event::EventEnd;
 use model::spec::Direction;

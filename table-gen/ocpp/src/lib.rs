@@ -11,8 +11,8 @@
 //!
 //! ## What the curve means
 //! A point says at which frequency which power is drawn from the grid; discharging is negative.
-//! Between two points the power lies on the line through them, so that -7000 W at 49.5 Hz and 0 W at
-//! 50 Hz are -3500 W at 49.75 Hz. Beyond the ends the power is that of the end. `v2xBaseline` is
+//! Between two points the power lies on the line through them, so that -7000 W at 49.5 Hz and 0 W
+//! at 50 Hz are -3500 W at 49.75 Hz. Beyond the ends the power is that of the end. `v2xBaseline` is
 //! added. `docs/ocpp.md` is the reader's page.
 #![forbid(unsafe_code)]
 

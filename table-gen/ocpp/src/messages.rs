@@ -1,8 +1,8 @@
 //! The messages' fields, by the published schemas of OCPP 2.1, edition 1.
 //!
 //! Fields that a spec has no use for are left out here and refused when they are read: a limit or a
-//! set-point in the same period would change what the curve means. `customData` is read and dropped,
-//! as the standard lets every receiver do.
+//! set-point in the same period would change what the curve means. `customData` is read and
+//! dropped, as the standard lets every receiver do.
 
 use serde::{Deserialize, Serialize};
 use serde_json::Value;

@@ -1,4 +1,5 @@
-//! `budget TABLE|SPEC`: bytes by part, visits, free flash; `--sweep` the front of guarantee against bytes.
+//! `budget TABLE|SPEC`: bytes by part, visits, free flash; `--sweep` the front of guarantee against
+//! bytes.
 
 use std::path::{Path, PathBuf};
 
@@ -8,8 +9,8 @@ use super::{Failure, OutputArgs, Overrides, output, progress};
 use model::budget::Budget;
 use model::spec::Spec;
 use synth::budget::{self, sweep};
-use synth::compress::{self, Options};
-use synth::pipeline;
+use synth::compress::Options;
+use synth::pipeline::{self, Encoding};
 use synth::synthesis;
 
 /// Arguments of `budget`.
@@ -76,9 +77,7 @@ pub(super) fn run(args: &BudgetArgs) -> Result<(), Failure> {
             pipeline::response(&spec)?
         } else {
             let synthesis = synthesis::synthesise(&spec, &progress::watch)?;
-            compress::table(&spec, &synthesis, &options, &progress::watch)
-                .map_err(|error| Failure::No(error.to_string()))?
-                .0
+            pipeline::emit(&synthesis, Encoding::Tree(options), &progress::watch)?.bytes
         }
     };
     let table = TableView::parse(&bytes)

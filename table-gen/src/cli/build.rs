@@ -11,8 +11,8 @@ use serde::Serialize;
 
 use super::checkpoint::CheckpointArgs;
 use super::files::write_all;
-use super::synth::SynthReport;
-use super::{Failure, OutputArgs, SpecArgs, compare, output, progress, simulate, verify};
+use super::synth_report::SynthReport;
+use super::{Failure, OutputArgs, SpecArgs, compare, output, progress, run_tables, verify};
 use lab::compare::CompareConfig;
 use lab::compare::verdict::Verdict;
 use lab::report::{self, Findings, scorecard};
@@ -20,9 +20,10 @@ use lab::simulation::closed_loop::{self, Estimator};
 use lab::simulation::monitor::Summary;
 use lab::simulation::scenario::Scenario;
 use lab::simulation::trajectory::PhaseSpan;
+use model::hex::hex;
 use model::verdict::ClaimName;
 use synth::budget;
-use synth::compress::{LawReport, Options, VISITS_GOAL};
+use synth::compress::{CompressedLaw, Options, VISITS_GOAL};
 use synth::pipeline::{self, Emitted, Encoding};
 
 /// Arguments of `build`.
@@ -116,7 +117,7 @@ pub(super) fn run(args: &BuildArgs) -> Result<(), Failure> {
         (SynthReport::of_response(&spec), emitted)
     } else {
         let synthesis = args.checkpoint.synthesise(&spec)?;
-        let emitted = pipeline::emit(&spec, &synthesis, args.encoding(), &progress::watch)?;
+        let emitted = pipeline::emit(&synthesis, args.encoding(), &progress::watch)?;
         (SynthReport::new(&spec, &synthesis), emitted)
     };
     let bytes = emitted.bytes;
@@ -172,8 +173,8 @@ pub(super) fn run(args: &BuildArgs) -> Result<(), Failure> {
         synth.print();
         print_encodings(&result);
         verify::print(&verdict);
-        simulate::summary(&run.summary);
-        simulate::phases(&run.phases);
+        run_tables::summary(&run.summary);
+        run_tables::phases(&run.phases);
         let names: Vec<&str> = files.iter().map(|(name, _)| *name).collect();
         output::line(format_args!(
             "wrote {} to {}",
@@ -184,7 +185,7 @@ pub(super) fn run(args: &BuildArgs) -> Result<(), Failure> {
     verify::answer(&verdict)
 }
 
-fn encodings(table: &TableView<'_>, reports: &[(Law, LawReport)]) -> Vec<EncodingReport> {
+fn encodings(table: &TableView<'_>, laws: &[CompressedLaw]) -> Vec<EncodingReport> {
     if table.response().is_some() {
         return vec![EncodingReport {
             phase: Phase::Response.name(),
@@ -200,14 +201,15 @@ fn encodings(table: &TableView<'_>, reports: &[(Law, LawReport)]) -> Vec<Encodin
             worst_steps_minimal: None,
         }];
     }
-    let laws = [(Law::C1, "C1"), (Law::C2, "C2"), (Law::Hold, "Hold")];
-    laws.into_iter()
-        .filter_map(|(law, phase)| {
+    Law::ALL
+        .into_iter()
+        .filter_map(|law| {
             let view = table.law(law)?;
             let entry = table.header().laws[law as usize]?;
-            let report = reports.iter().find(|(of, _)| *of == law).map(|(_, r)| r);
+            let compressed = laws.iter().find(|found| found.law == law);
+            let report = compressed.map(|law| &law.report);
             Some(EncodingReport {
-                phase,
+                phase: law.name(),
                 encoding: if entry.inputs_kind == InputsKind::Dense as u8 {
                     "dense"
                 } else {
@@ -280,9 +282,4 @@ fn print_encodings(report: &BuildReport<'_>) {
             output::grouped(dense as usize)
         ));
     }
-}
-
-/// Lower-case hexadecimal.
-pub(super) fn hex(bytes: &[u8]) -> String {
-    bytes.iter().map(|byte| format!("{byte:02x}")).collect()
 }

@@ -25,7 +25,8 @@ pub(super) struct CounterfactualArgs {
         default_value = "0.7,1.4"
     )]
     fleet_gw: Vec<f64>,
-    /// Demand that relays disconnected when the record passed 48.8 Hz [GW]; the paper says about 1 GW for 2019
+    /// Demand that relays disconnected when the record passed 48.8 Hz [GW]; the paper says about 1
+    /// GW for 2019
     #[arg(long, value_name = "GW", default_value_t = 1.0)]
     relieved_gw: f64,
     /// Response that the governors held on the day [GW], for the second plant

@@ -4,8 +4,8 @@ use std::path::Path;
 
 use super::{Failure, progress};
 
-/// Writes all files into a folder, or none: they are made in a temporary folder beside their places and moved when all
-/// of them are complete.
+/// Writes all files into a folder, or none: they are made in a temporary folder beside their places
+/// and moved when all of them are complete.
 pub(super) fn write_all(dir: &Path, files: &[(&str, &[u8])]) -> Result<(), Failure> {
     let fail = |path: &Path, error: std::io::Error| {
         Failure::BadInput(format!("{}: {error}", path.display()))

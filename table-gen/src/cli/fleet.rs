@@ -6,7 +6,7 @@ use std::time::Instant;
 use firmware::table::TableView;
 use serde::Serialize;
 
-use super::{Failure, OutputArgs, SpecArgs, output, plot, progress, simulate};
+use super::{Failure, OutputArgs, SpecArgs, output, plot, progress, run_tables};
 use lab::fleet::measure::FleetMeasures;
 use lab::fleet::{self, FleetConfig, FleetRun, INSTANCES_MAX};
 use lab::simulation::NOMINAL_HZ;
@@ -21,7 +21,8 @@ pub(super) struct FleetArgs {
     spec: SpecArgs,
     #[command(flatten)]
     output: OutputArgs,
-    /// Instances of the firmware; together they have the power of the spec's fleet. Default: the spec's chargers
+    /// Instances of the firmware; together they have the power of the spec's fleet. Default: the
+    /// spec's chargers
     #[arg(long, value_name = "N")]
     chargers: Option<usize>,
     /// Lost infeed [GW]; default: the middle of the spec's band
@@ -146,7 +147,7 @@ pub(super) fn run(args: &FleetArgs) -> Result<(), Failure> {
     if args.output.json {
         return output::json(&report);
     }
-    simulate::summary(&run.summary);
+    run_tables::summary(&run.summary);
     print(&report);
     output::line(format_args!(
         "{} chargers for {} s in {elapsed_s:.2} s; {} bytes each",
@@ -160,7 +161,7 @@ pub(super) fn run(args: &FleetArgs) -> Result<(), Failure> {
             .iter()
             .map(|s| (s.time_s, NOMINAL_HZ + s.f))
             .collect();
-        output::line(plot::frequency(&points, &simulate::levels_hz(&spec)));
+        output::line(plot::frequency(&points, &run_tables::levels_hz(&spec)));
     }
     Ok(())
 }

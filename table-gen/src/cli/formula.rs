@@ -7,19 +7,22 @@ use serde::Serialize;
 use super::record::RecordOptions;
 use super::{Failure, OutputArgs, SpecArgs, output};
 use lab::robustness::{Sample, robustness};
-use model::logic::{self, Compiled};
+use model::logic;
+use model::spec::{self, Compiled};
 
 /// Arguments of `formula`.
 #[derive(Debug, clap::Args)]
 pub(super) struct FormulaArgs {
-    /// The formula, e.g. 'G(f >= -0.8) & G(!(f in I1) -> F[<=60s] f in I1)'; f is the deviation from nominal
+    /// The formula, e.g. 'G(f >= -0.8) & G(!(f in I1) -> F[<=60s] f in I1)'; f is the deviation
+    /// from nominal
     #[arg(value_name = "FORMULA")]
     formula: String,
     #[command(flatten)]
     spec: SpecArgs,
     #[command(flatten)]
     output: OutputArgs,
-    /// Instead of compiling to games: the formula's robustness on a recorded frequency (CSV as for `replay`)
+    /// Instead of compiling to games: the formula's robustness on a recorded frequency (CSV as for
+    /// `replay`)
     #[arg(long, value_name = "TRACE.csv")]
     trace: Option<PathBuf>,
     #[command(flatten)]
@@ -62,7 +65,7 @@ pub(super) fn run(args: &FormulaArgs) -> Result<(), Failure> {
         report.robustness = Some(value);
     } else {
         let compiled =
-            logic::compile(&formula, &spec).map_err(|error| Failure::No(error.to_string()))?;
+            spec::compile(&formula, &spec).map_err(|error| Failure::No(error.to_string()))?;
         compiled.applied(&spec).validate("the formula's spec")?;
         report.games = Some(compiled);
     }

@@ -3,12 +3,15 @@
 //! Exit codes: 0 done; 1 the answer is "no" (not verified, no controller exists, limit reached); 2
 //! bad input.
 
+mod arguments;
 mod band;
 mod budget;
 mod build;
+mod chances;
 mod checkpoint;
 mod compare;
 mod counterfactual;
+mod failure;
 mod falsify;
 mod files;
 mod fleet;
@@ -26,16 +29,19 @@ mod ranks;
 mod record;
 mod replay;
 mod report;
+mod run_tables;
 mod simulate;
 mod synth;
+mod synth_report;
 mod time_left;
 mod verify;
 
 use std::process::ExitCode;
 
-use clap::{Args, Parser, Subcommand};
+pub(crate) use arguments::{OutputArgs, Overrides, SpecArgs};
+pub(crate) use failure::Failure;
 
-use model::spec::{Spec, SpecError};
+use clap::{Parser, Subcommand};
 
 /// Synthesises, compresses, verifies and simulates frequency-response tables for EV chargers.
 #[derive(Debug, Parser)]
@@ -79,94 +85,6 @@ enum Command {
     Inspect(inspect::InspectArgs),
     /// Every key of a spec: unit, default, what is allowed
     Keys(keys::KeysArgs),
-}
-
-/// The spec and what overrides it.
-#[derive(Debug, Clone, Args)]
-pub(crate) struct SpecArgs {
-    /// Name of a shipped spec, or path of a TOML file
-    #[arg(value_name = "SPEC")]
-    spec: String,
-    #[command(flatten)]
-    overrides: Overrides,
-}
-
-/// Options of every command that reads a spec.
-#[derive(Debug, Clone, Args)]
-pub(crate) struct Overrides {
-    /// Override a key of the spec, e.g. plant.inertia_gw_s_per_hz=3; KEY=none removes an optional
-    /// one
-    #[arg(long = "set", value_name = "KEY=VALUE")]
-    set: Vec<String>,
-}
-
-/// Options of every command.
-#[derive(Debug, Clone, Copy, Args)]
-pub(crate) struct OutputArgs {
-    /// Print one JSON object on stdout and nothing else there
-    #[arg(long)]
-    json: bool,
-}
-
-impl SpecArgs {
-    /// Loads the spec.
-    fn load(&self) -> Result<Spec, Failure> {
-        self.overrides.load(&self.spec)
-    }
-}
-
-impl Overrides {
-    /// Loads a spec by name or path.
-    fn load(&self, spec: &str) -> Result<Spec, Failure> {
-        Ok(Spec::load(spec, &self.set)?)
-    }
-}
-
-/// Why a command did not end with 0.
-#[derive(Debug)]
-pub(crate) enum Failure {
-    /// The answer is "no".
-    No(String),
-    /// The input is bad, or a file cannot be read or written.
-    BadInput(String),
-}
-
-impl Failure {
-    /// Bad input, told by an error.
-    fn bad(error: impl std::fmt::Display) -> Self {
-        Self::BadInput(error.to_string())
-    }
-}
-
-impl From<SpecError> for Failure {
-    fn from(error: SpecError) -> Self {
-        Self::bad(error)
-    }
-}
-
-impl From<::synth::pipeline::PipelineError> for Failure {
-    fn from(error: ::synth::pipeline::PipelineError) -> Self {
-        match error {
-            ::synth::pipeline::PipelineError::Synthesis(error) => error.into(),
-            ::synth::pipeline::PipelineError::Compress(error) => Self::No(error.to_string()),
-            other => Self::bad(other),
-        }
-    }
-}
-
-impl From<::synth::synthesis::SynthesisError> for Failure {
-    fn from(error: ::synth::synthesis::SynthesisError) -> Self {
-        use ::synth::game::GameError;
-        use ::synth::synthesis::SynthesisError as E;
-        match &error {
-            E::Delay { .. } | E::Grid(_) | E::Abstraction(_) | E::Response => Self::bad(error),
-            E::Game {
-                error: GameError::EmptyTarget,
-                ..
-            } => Self::bad(error),
-            E::Game { .. } | E::NoController { .. } => Self::No(error.to_string()),
-        }
-    }
 }
 
 /// Runs the command line of this process.

@@ -4,12 +4,13 @@ use std::fs::File;
 use std::path::PathBuf;
 
 use super::{Failure, OutputArgs, output, progress};
-use lab::monitor;
+use lab::telemetry_lines;
 
 /// Arguments of `monitor`.
 #[derive(Debug, clap::Args)]
 pub(super) struct MonitorArgs {
-    /// Serial port (set its speed first: stty -F PORT 115200 raw -echo) or recorded file; - for standard input
+    /// Serial port (set its speed first: stty -F PORT 115200 raw -echo) or recorded file; - for
+    /// standard input
     #[arg(value_name = "PORT|FILE")]
     source: PathBuf,
     /// Print every N-th tick; ticks that change mode, phase or faults are always printed
@@ -37,7 +38,7 @@ pub(super) fn run(args: &MonitorArgs) -> Result<(), Failure> {
         Some(&mut stdout)
     };
     progress::catch_interrupts();
-    let summary = match monitor::watch(stream, out, args.every, &progress::interrupted) {
+    let summary = match telemetry_lines::watch(stream, out, args.every, &progress::interrupted) {
         Ok(summary) => summary,
         // Whoever read the lines has seen enough.
         Err(error) if error.kind() == std::io::ErrorKind::BrokenPipe => return Ok(()),

@@ -3,17 +3,14 @@
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::{Duration, Instant};
 
-use firmware::table::TableView;
 use indicatif::{ProgressBar, ProgressDrawTarget};
 use serde::Serialize;
 
-use super::simulate::{Chances, SimulateArgs};
-use super::{Failure, output, progress, simulate};
+use super::{Failure, OutputArgs, output, progress, run_tables};
 use lab::simulation::closed_loop::ClosedLoop;
 use lab::simulation::monte_carlo::draws::Draws;
 use lab::simulation::monte_carlo::statistics::{Quantiles, Share};
 use lab::simulation::monte_carlo::{self, RUNS_MAX, Statistics};
-use model::spec::Spec;
 
 /// Runs between two looks at the clock and at Ctrl-C.
 const BATCH: usize = 1000;
@@ -24,30 +21,6 @@ struct MonteCarloReport<'r> {
     draws: &'r Draws,
     #[serde(flatten)]
     statistics: &'r Statistics,
-}
-
-/// The bands of a spec, as the options change them.
-pub(super) fn draws(
-    spec: &Spec,
-    chances: &Chances,
-    duration_s: Option<f64>,
-) -> Result<Draws, Failure> {
-    let mut draws = Draws::of(spec);
-    draws.duration_s = duration_s.unwrap_or(draws.duration_s);
-    draws.participation_error = chances
-        .participation_error
-        .unwrap_or(draws.participation_error);
-    if let Some(band) = chances.loss_gw {
-        draws.loss_gw = band.0;
-    }
-    if let Some(band) = chances.delay_s {
-        draws.delay_s = band.0;
-    }
-    if let Some(bounds) = chances.measurement_error {
-        draws.measurement_error = bounds.0;
-    }
-    draws.check().map_err(Failure::bad)?;
-    Ok(draws)
 }
 
 /// Runs the loop many times with a progress bar.
@@ -80,22 +53,21 @@ pub(super) fn many(
     statistics.ok_or_else(|| Failure::No("interrupted".to_owned()))
 }
 
-/// Runs the command: N runs, and their table or JSON.
+/// Runs the command: N runs from a seed, and their table or JSON.
 pub(super) fn run(
-    args: &SimulateArgs,
-    spec: &Spec,
-    table: &TableView<'_>,
-    runs: usize,
+    closed_loop: &ClosedLoop<'_>,
+    spec_name: &str,
+    draws: &Draws,
+    (runs, seed): (usize, u64),
+    output_args: &OutputArgs,
 ) -> Result<(), Failure> {
-    let draws = draws(spec, &args.chances, args.duration_s)?;
-    let closed_loop = ClosedLoop::new(spec, table, args.estimator()).map_err(Failure::bad)?;
     let start = Instant::now();
-    let statistics = many(&closed_loop, &draws, runs, args.seed)?;
+    let statistics = many(closed_loop, draws, runs, seed)?;
     let elapsed_s = start.elapsed().as_secs_f64();
-    if args.output.json {
+    if output_args.json {
         return output::json(&MonteCarloReport {
-            spec: &spec.name,
-            draws: &draws,
+            spec: spec_name,
+            draws,
             statistics: &statistics,
         });
     }
@@ -106,7 +78,7 @@ pub(super) fn run(
         draws.duration_s,
         statistics.worst.seed
     ));
-    simulate::summary(&statistics.worst.summary);
+    run_tables::summary(&statistics.worst.summary);
     Ok(())
 }
 

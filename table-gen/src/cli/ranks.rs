@@ -1,8 +1,6 @@
 //! `synth` on the ranks of an MPI job. Every rank plays its slab; the first one tells.
 
-use serde::Serialize;
-
-use super::synth::{SynthReport, digest_of};
+use super::synth_report::{RanksReport, SynthReport, digest_of};
 use super::{Failure, progress};
 use model::spec::Spec;
 use mpi_ranks::World;
@@ -11,17 +9,6 @@ use synth::game::exchange::Lost;
 use synth::ranks::{Transport, gather};
 use synth::synthesis;
 use synth::usage;
-
-/// What the ranks needed.
-#[derive(Debug, Clone, Serialize)]
-pub(super) struct RanksReport {
-    /// Number of ranks.
-    ranks: usize,
-    /// Bytes that all ranks sent after sweeps.
-    sent_bytes: u64,
-    /// Of the largest rank [MB].
-    peak_rss_mb: f64,
-}
 
 /// Plays the games of a spec; the report is the first rank's.
 pub(super) fn run(

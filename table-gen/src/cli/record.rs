@@ -1,5 +1,5 @@
-//! A recorded frequency and the table that runs on it: what `replay` and `counterfactual` share, and
-//! the options by which every command reads a record.
+//! A recorded frequency and the table that runs on it: what `replay` and `counterfactual` share,
+//! and the options by which every command reads a record.
 
 use std::path::{Path, PathBuf};
 

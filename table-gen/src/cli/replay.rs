@@ -6,7 +6,7 @@ use firmware::table::TableView;
 use serde::Serialize;
 
 use super::record::RecordArgs;
-use super::{Failure, OutputArgs, output, plot, simulate};
+use super::{Failure, OutputArgs, output, plot, run_tables};
 use lab::replay::{FaultCount, REACTION_STEP_MAX_S, Replay, replay};
 use lab::simulation::trajectory::PhaseSpan;
 
@@ -110,14 +110,14 @@ pub(super) fn run(args: &ReplayArgs) -> Result<(), Failure> {
         ]);
     }
     output::line(rows);
-    simulate::phases(&result.phases);
+    run_tables::phases(&result.phases);
     if args.plot {
         let points: Vec<(f64, f64)> = record
             .samples
             .iter()
             .map(|sample| (sample.time_s, sample.frequency_hz))
             .collect();
-        output::line(plot::frequency(&points, &simulate::levels_hz(&spec)));
+        output::line(plot::frequency(&points, &run_tables::levels_hz(&spec)));
     }
     Ok(())
 }

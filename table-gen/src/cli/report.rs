@@ -30,13 +30,15 @@ pub(super) struct ReportArgs {
     spec: SpecArgs,
     #[command(flatten)]
     output: OutputArgs,
-    /// Folder for report.html and the figures as .svg and .csv; verdict.json and budget.json are taken from there
+    /// Folder for report.html and the figures as .svg and .csv; verdict.json and budget.json are
+    /// taken from there
     #[arg(long, value_name = "DIR", default_value = "out")]
     out: PathBuf,
     /// Table of the spec, instead of synthesising one
     #[arg(long, value_name = "FILE")]
     table: Option<PathBuf>,
-    /// Specs to show beside it, synthesised; default: the same with the other direction of charging, if it is shipped
+    /// Specs to show beside it, synthesised; default: the same with the other direction of
+    /// charging, if it is shipped
     #[arg(long, value_name = "SPEC")]
     beside: Vec<String>,
     /// Show no other spec

@@ -6,8 +6,9 @@ use clap::ValueEnum;
 use firmware::table::TableView;
 use serde::Serialize;
 
-use super::band::{Band, PerState};
-use super::{Failure, OutputArgs, SpecArgs, monte_carlo, output, plot, progress};
+use super::band::Band;
+use super::chances::Chances;
+use super::{Failure, OutputArgs, SpecArgs, monte_carlo, output, plot, progress, run_tables};
 use lab::report::limits::symbolic_under;
 use lab::simulation::beyond::Disturbances;
 use lab::simulation::beyond::file::ScenarioFile;
@@ -36,9 +37,9 @@ pub(super) struct SimulateArgs {
     #[command(flatten)]
     spec: SpecArgs,
     #[command(flatten)]
-    pub(super) output: OutputArgs,
+    output: OutputArgs,
     #[command(flatten)]
-    pub(super) chances: Chances,
+    chances: Chances,
     /// Who controls the chargers
     #[arg(long, value_enum, default_value = "symbolic")]
     controller: ControllerArg,
@@ -47,14 +48,15 @@ pub(super) struct SimulateArgs {
     deadband_hz: Option<f64>,
     /// Length of a run [s]; default 300, with --runs the spec's horizon or 120
     #[arg(long, value_name = "S", allow_negative_numbers = true)]
-    pub(super) duration_s: Option<f64>,
+    duration_s: Option<f64>,
     /// Seed of what is drawn; with --runs that of the first run, the next has the next seed
     #[arg(long, value_name = "N", default_value_t = 0)]
-    pub(super) seed: u64,
+    seed: u64,
     /// Many runs, each drawn from the spec's uncertainty as changed by the options
     #[arg(long, value_name = "N")]
     runs: Option<usize>,
-    /// What happens to the grid, and limits of its plant: gb-2019, second-loss, tired-governors, or a TOML file
+    /// What happens to the grid, and limits of its plant: gb-2019, second-loss, tired-governors, or
+    /// a TOML file
     #[arg(long, value_name = "FILE", conflicts_with_all = ["runs", "loss_gw"])]
     scenario: Option<String>,
     /// Table to run, instead of synthesising one; it must be of this spec
@@ -71,26 +73,9 @@ pub(super) struct SimulateArgs {
     csv: Option<PathBuf>,
 }
 
-/// What is uncertain in a run.
-#[derive(Debug, Clone, Copy, clap::Args)]
-pub(super) struct Chances {
-    /// Lost infeed [GW]; default: the middle of the spec's band. With --runs a band LOW,HIGH; default: the spec's
-    #[arg(long, value_name = "GW", allow_hyphen_values = true)]
-    pub(super) loss_gw: Option<Band>,
-    /// Relative error of the delivered participation, drawn each tick; default 0, with --runs the spec's
-    #[arg(long, value_name = "X", allow_negative_numbers = true)]
-    pub(super) participation_error: Option<f64>,
-    /// Error of the measured state, drawn each tick [Hz,GW,GW,GW]; default 0, with --runs the spec's
-    #[arg(long, value_name = "F,G,L,P", allow_hyphen_values = true)]
-    pub(super) measurement_error: Option<PerState>,
-    /// Time from a command to its power [s]; default: the spec's. With --runs also a band LOW,HIGH
-    #[arg(long, value_name = "S", allow_hyphen_values = true)]
-    pub(super) delay_s: Option<Band>,
-}
-
 impl SimulateArgs {
     /// How the firmware is to know the state.
-    pub(super) fn estimator(&self) -> Estimator {
+    fn estimator(&self) -> Estimator {
         if self.observer {
             Estimator::Observer
         } else {
@@ -172,12 +157,13 @@ pub(super) fn run(args: &SimulateArgs) -> Result<(), Failure> {
         Some(name) => Some(ScenarioFile::load(name).map_err(Failure::bad)?),
         None => None,
     };
-    let scenario = match args.runs {
+    let draws = match args.runs {
+        None => None,
+        Some(_) => Some(args.chances.draws(&spec, args.duration_s)?),
+    };
+    let scenario = match &draws {
         None => args.scenario(&spec, file.as_ref())?,
-        Some(_) => {
-            let draws = monte_carlo::draws(&spec, &args.chances, args.duration_s)?;
-            draws.scenario(args.seed)
-        }
+        Some(draws) => draws.scenario(args.seed),
     };
     let disturbances = match &file {
         Some(file) => file.disturbances(&spec).map_err(Failure::bad)?,
@@ -192,8 +178,17 @@ pub(super) fn run(args: &SimulateArgs) -> Result<(), Failure> {
             let bytes = pipeline::table_bytes(&spec, args.table.as_deref(), &progress::watch)?;
             let table = TableView::parse(&bytes)
                 .map_err(|error| Failure::BadInput(format!("{error:?}")))?;
-            if let Some(runs) = args.runs.filter(|runs| *runs > 1) {
-                return monte_carlo::run(args, &spec, &table, runs);
+            if let (Some(runs @ 2..), Some(draws)) = (args.runs, &draws) {
+                let estimator = args.estimator();
+                let closed_loop =
+                    ClosedLoop::new(&spec, &table, estimator).map_err(Failure::bad)?;
+                return monte_carlo::run(
+                    &closed_loop,
+                    &spec.name,
+                    draws,
+                    (runs, args.seed),
+                    &args.output,
+                );
             }
             let beyond = file.as_ref().map(|_| &disturbances);
             let run = symbolic(&spec, &table, &scenario, beyond, args.estimator())?;
@@ -218,13 +213,14 @@ pub(super) fn run(args: &SimulateArgs) -> Result<(), Failure> {
     if args.output.json {
         return output::json(&report);
     }
-    summary(report.summary);
-    phases(&run.phases);
+    run_tables::summary(report.summary);
+    run_tables::phases(&run.phases);
     for sentence in outside.iter().flatten() {
         output::line(format_args!("outside the proof: {sentence}"));
     }
     if args.plot {
-        output::line(plot::frequency(&frequency(&run), &levels_hz(&spec)));
+        let points = run_tables::frequency(&run);
+        output::line(plot::frequency(&points, &run_tables::levels_hz(&spec)));
     }
     Ok(())
 }
@@ -252,24 +248,6 @@ fn symbolic(
     })
 }
 
-/// Time and absolute frequency of a run's samples.
-pub(super) fn frequency(run: &Run) -> Vec<(f64, f64)> {
-    let point = |sample: &lab::simulation::trajectory::Sample| {
-        (sample.time_s, NOMINAL_HZ + sample.state[0])
-    };
-    run.samples.iter().map(point).collect()
-}
-
-/// Levels that a plot marks: the lower ends of I1 and I2, and the containment \[Hz\].
-pub(super) fn levels_hz(spec: &Spec) -> Vec<f64> {
-    let requirements = &spec.requirements;
-    [requirements.outer_hz[0], requirements.inner_hz[0]]
-        .into_iter()
-        .chain(requirements.containment_hz)
-        .map(|deviation| NOMINAL_HZ + deviation)
-        .collect()
-}
-
 fn write_csv(path: &std::path::Path, run: &Run) -> Result<(), Failure> {
     let fail =
         |error: &dyn std::fmt::Display| Failure::BadInput(format!("{}: {error}", path.display()));
@@ -282,68 +260,4 @@ fn write_csv(path: &std::path::Path, run: &Run) -> Result<(), Failure> {
         writer.serialize(row).map_err(|e| fail(&e))?;
     }
     writer.flush().map_err(|e| fail(&e))
-}
-
-/// A summary as a table on stdout.
-pub(super) fn summary(summary: &Summary) {
-    let mut table = output::table(&["measure", "value"]);
-    let yes = |flag: bool| if flag { "yes" } else { "no" }.to_owned();
-    let rows = [
-        (
-            "nadir",
-            format!(
-                "{:.4} Hz at {:.2} s",
-                summary.nadir_hz, summary.nadir_time_s
-            ),
-        ),
-        ("final", format!("{:.4} Hz", summary.final_hz)),
-        (
-            "largest participation",
-            format!("{:.3}", summary.max_participation),
-        ),
-        (
-            "below 49.5 Hz",
-            format!("{:.2} s", summary.seconds_below_49_5),
-        ),
-        (
-            "containment breached",
-            summary
-                .containment_breached
-                .map_or_else(|| "no limit stated".to_owned(), yes),
-        ),
-        (
-            "back in I1 after",
-            format!("{} s", output::seconds(summary.entered_outer_s)),
-        ),
-        (
-            "back in I2 after",
-            format!("{} s", output::seconds(summary.entered_inner_s)),
-        ),
-        ("stayed in I2", yes(summary.stayed_in_inner)),
-        ("satisfies psi", yes(summary.satisfies_psi)),
-    ];
-    for (name, value) in rows {
-        table.add_row(vec![name.to_owned(), value]);
-    }
-    if summary.fallback_s > 0.0 {
-        let value = format!("{:.1} s", summary.fallback_s);
-        table.add_row(vec!["droop as the fallback".to_owned(), value]);
-    }
-    output::line(table);
-}
-
-/// Phases as a table on stdout.
-pub(super) fn phases(phases: &[PhaseSpan]) {
-    if phases.is_empty() {
-        return;
-    }
-    let mut table = output::table(&["phase", "from s", "to s"]);
-    for span in phases {
-        table.add_row(vec![
-            span.phase.to_owned(),
-            format!("{:.1}", span.start_s),
-            format!("{:.1}", span.end_s),
-        ]);
-    }
-    output::line(table);
 }

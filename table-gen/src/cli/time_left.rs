@@ -6,7 +6,8 @@ use synth::game::Sweep;
 
 /// Sweeps that the estimate looks back on.
 const WINDOW: usize = 4;
-/// The cells that change must shrink at least by this factor a sweep for the game to count as dying out.
+/// The cells that change must shrink at least by this factor a sweep for the game to count as dying
+/// out.
 const DYING_OUT: f64 = 0.8;
 
 /// What the sweeps so far say about the time left \[s\].
@@ -14,8 +15,8 @@ const DYING_OUT: f64 = 0.8;
 pub(super) enum TimeLeft {
     /// Fewer and fewer cells change: until the last one at the present pace.
     About(f64),
-    /// Until every open cell has changed, at the present cells a second. A game may end before that, and slows down only
-    /// if fewer cells change a sweep.
+    /// Until every open cell has changed, at the present cells a second. A game may end before
+    /// that, and slows down only if fewer cells change a sweep.
     AtMost(f64),
 }
 
@@ -27,8 +28,8 @@ pub(super) struct Pace {
 }
 
 impl Pace {
-    /// Takes note of a sweep that ended so many seconds after the game began. `None` until a few sweeps are known, and
-    /// where nothing changes any more.
+    /// Takes note of a sweep that ended so many seconds after the game began. `None` until a few
+    /// sweeps are known, and where nothing changes any more.
     pub(super) fn after(&mut self, elapsed_s: f64, sweep: &Sweep) -> Option<TimeLeft> {
         self.sweeps.push_back((elapsed_s, sweep.changed));
         if self.sweeps.len() <= WINDOW {
@@ -97,7 +98,8 @@ mod tests {
         assert_eq!(left.unwrap().to_string(), "at most 10 s left at this pace");
     }
 
-    /// Half as many cells each sweep: 4096, ..., 256 and then eight sweeps down to one cell, and one that finds nothing.
+    /// Half as many cells each sweep: 4096, ..., 256 and then eight sweeps down to one cell, and
+    /// one that finds nothing.
     #[test]
     fn a_game_that_dies_out_ends_when_less_than_a_cell_is_left() {
         let mut pace = Pace::default();

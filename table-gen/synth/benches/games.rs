@@ -1,6 +1,7 @@
 //! Whole games at three sizes, and the parts of a sweep alone.
 //!
-//! `cargo bench -p synth`. The reported times are wall times; `docs/performance.md` holds processor times and ratios.
+//! `cargo bench -p synth`. The reported times are wall times; `docs/performance.md` holds processor
+//! times and ratios.
 
 #![allow(clippy::unwrap_used, reason = "a benchmark that cannot go on fails")]
 
@@ -10,6 +11,7 @@ use synth::abstraction::Abstraction;
 use synth::game::bitset::BitSet;
 use synth::game::inclusion::Inclusion;
 use synth::game::unwatched;
+use synth::problem::Problem;
 use synth::synthesis;
 
 fn main() {
@@ -53,8 +55,8 @@ fn reach_avoid_c1_and_c2(bencher: Bencher<'_, '_>, size: &str) {
 #[divan::bench]
 fn successor_boxes_of_all_inputs(bencher: Bencher<'_, '_>) {
     let spec = spec(&[]);
-    let grid = synthesis::device_grid(&spec).unwrap();
-    let abstraction = synthesis::abstraction(&spec, &grid).unwrap();
+    let problem = Problem::new(&spec).unwrap();
+    let abstraction = synthesis::abstraction(&problem).unwrap();
     let cells: Vec<[u32; 4]> = (0..4096)
         .map(|i| {
             abstraction
@@ -79,8 +81,8 @@ fn successor_boxes_of_all_inputs(bencher: Bencher<'_, '_>) {
 #[divan::bench]
 fn erosion_of_one_sweep(bencher: Bencher<'_, '_>) {
     let spec = spec(&[]);
-    let grid = synthesis::device_grid(&spec).unwrap();
-    let abstraction = synthesis::abstraction(&spec, &grid).unwrap();
+    let problem = Problem::new(&spec).unwrap();
+    let abstraction = synthesis::abstraction(&problem).unwrap();
     let shape = *abstraction.shape();
     let full = BitSet::full(shape.cells());
     bencher

@@ -1,7 +1,7 @@
 //! SCOTS' boost converter: `cargo run --release --example boost_converter`.
 
 use synth::abstraction::Abstraction;
-use synth::game::guard::Unguarded;
+use synth::abstraction::guard::Unguarded;
 use synth::game::{Unwatched, safety::safety};
 use synth::usage;
 use synth::yardsticks::boost_converter;

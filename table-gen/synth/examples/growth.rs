@@ -16,9 +16,10 @@ use firmware::grid::Grid;
 use model::spec::Spec;
 use synth::abstraction::Abstraction;
 use synth::abstraction::affine::AffineAbstraction;
+use synth::abstraction::guard::Unguarded;
 use synth::game::bitset::BitSet;
-use synth::game::guard::Unguarded;
 use synth::game::{GameError, Sweep, Watch, reach::reach_lean, safety::safety_lean};
+use synth::problem::Problem;
 use synth::{synthesis, usage};
 
 type Engine = AffineAbstraction<4>;
@@ -63,7 +64,7 @@ fn band(abstraction: &Engine, low: f64, high: f64) -> BitSet {
     let row: Vec<bool> = (0..shape.count[0])
         .map(|f| {
             let (from, to) = shape.interval(0, f);
-            from >= low * synthesis::MICRO && to <= high * synthesis::MICRO
+            from >= low * synth::drives::MICRO && to <= high * synth::drives::MICRO
         })
         .collect();
     let mut set = BitSet::new(shape.cells());
@@ -77,10 +78,10 @@ fn band(abstraction: &Engine, low: f64, high: f64) -> BitSet {
 /// The engine on a grid of so many cells. The spec is that of the coarsest grid: its check of
 /// memory is for the games that keep everything.
 fn engine(counts: [u32; 4]) -> Result<Engine, Box<dyn std::error::Error>> {
-    let micro = |hz_or_gw: f64| (hz_or_gw * synthesis::MICRO).round() as i32;
+    let micro = |hz_or_gw: f64| (hz_or_gw * synth::drives::MICRO).round() as i32;
     let width = |counts: &[u32; 4], d: usize| (UPPER[d] - LOWER[d]) / f64::from(counts[d]);
     let widths: [f64; 4] =
-        std::array::from_fn(|d| f64::from(micro(width(&SIZES[0], d))) / synthesis::MICRO);
+        std::array::from_fn(|d| f64::from(micro(width(&SIZES[0], d))) / synth::drives::MICRO);
     let set = [
         format!("grid.lower={LOWER:?}"),
         format!("grid.upper={UPPER:?}"),
@@ -97,7 +98,7 @@ fn engine(counts: [u32; 4]) -> Result<Engine, Box<dyn std::error::Error>> {
         counts.map(|n| n as u16),
     )
     .map_err(|error| format!("{error:?}"))?;
-    Ok(synthesis::abstraction(&spec, &grid)?)
+    Ok(synthesis::abstraction(&Problem::on_grid(&spec, grid)?)?)
 }
 
 /// Least processor time of some runs of a game's first sweeps \[s\], and how many sweeps those

@@ -2,7 +2,7 @@
 //! The kernel of the band and the cells from which it is reached, with time and memory.
 
 use synth::abstraction::Abstraction;
-use synth::game::guard::Unguarded;
+use synth::abstraction::guard::Unguarded;
 use synth::game::{Unwatched, reach::reach, safety::safety};
 use synth::usage;
 use synth::yardsticks::two_areas;

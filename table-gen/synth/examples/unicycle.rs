@@ -1,7 +1,7 @@
 //! SCOTS' vehicle: `cargo run --release --example unicycle`.
 
 use synth::abstraction::Abstraction;
-use synth::game::guard::Unguarded;
+use synth::abstraction::guard::Unguarded;
 use synth::game::{Unwatched, reach::reach};
 use synth::usage;
 use synth::yardsticks::unicycle;

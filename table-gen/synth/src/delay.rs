@@ -1,33 +1,38 @@
-//! Commands that act with a delay: what the games know, and the coefficients with which the device predicts.
+//! Commands that act with a delay: what the games know, and the coefficients with which the device
+//! predicts.
 //!
-//! A command decided at t acts over [t + δ, t + δ + τ), τ the period. The device decides on a prediction ([`firmware::prediction`]); the games are
-//! played in its coordinate,
+//! A command decided at t acts over [t + δ, t + δ + τ), τ the period. The device decides on a
+//! prediction ([`firmware::prediction`]); the games are played in its coordinate,
 //!
 //! ```text
 //! ξ(t) = Φ_δ x̂(t) + Σ_j G_j u(t - j tick) + Γ_δ (-w₀) + r        x̂ = x + ε,  |ε| <= e,  w₀ the middle of the loss band
 //! ```
 //!
-//! with r the error of the coefficients, |r| <= ρ. Write the net power as P u - w₀ + d: what it is under the commands, and a deviation d that an
-//! adversary varies (loss within its band, delivered participation). Then, with b the direction of the drive,
+//! with r the error of the coefficients, |r| <= ρ. Write the net power as P u - w₀ + d: what it is
+//! under the commands, and a deviation d that an adversary varies (loss within its band, delivered
+//! participation). Then, with b the direction of the drive,
 //!
 //! ```text
 //! x(t+δ) = ξ(t) - Φ_δ ε - r + ∫ exp(A (t+δ-s)) b d(s) ds        over [t, t+δ]                              (1)
 //! ```
 //!
-//! and, as x(t+τ+δ) = Φ_τ x(t+δ) + Γ_τ (P u - w₀) + ∫ exp(A (t+τ+δ-s)) b d(s) ds over [t+δ, t+τ+δ], (1) at t and at t+τ give
+//! and, as x(t+τ+δ) = Φ_τ x(t+δ) + Γ_τ (P u - w₀) + ∫ exp(A (t+τ+δ-s)) b d(s) ds over [t+δ, t+τ+δ],
+//! (1) at t and at t+τ give
 //!
 //! ```text
 //! ξ(t+τ) = Φ_τ ξ(t) + Γ_τ (P u - w₀) - Φ_{τ+δ} ε - Φ_τ r + Φ_δ ε' + r' + ∫ exp(A σ) b d(t+τ+δ-σ) dσ     over [δ, τ+δ]    (2)
 //! ```
 //!
-//! for what d does in [t+τ, t+τ+δ] enters x(t+τ+δ) and ξ(t+τ) is predicted without it: it cancels. So the successor's box is
+//! for what d does in [t+τ, t+τ+δ] enters x(t+τ+δ) and ξ(t+τ) is predicted without it: it cancels.
+//! So the successor's box is
 //!
 //! ```text
 //! Φ_τ cell + Γ_τ (P u - w₀)  ±  ( |Φ_{τ+δ}| e + |Φ_δ| e + (|Φ_τ| + 1) ρ + ∫ |exp(A σ) b| |d| dσ over [δ, τ+δ] )
 //! ```
 //!
-//! In the integral, σ in [δ, τ] (if δ < τ) is the time under u itself, whose d is known to lie in the interval of that level; the rest, as long
-//! as min(δ, τ), is under commands decided before, which the game does not know: there |d| is the largest over all levels. With δ = 0 this is the
+//! In the integral, σ in [δ, τ] (if δ < τ) is the time under u itself, whose d is known to lie in
+//! the interval of that level; the rest, as long as min(δ, τ), is under commands decided before,
+//! which the game does not know: there |d| is the largest over all levels. With δ = 0 this is the
 //! games' box without a delay.
 //!
 //! By (1) the real state in which a command begins to act lies within
@@ -36,21 +41,22 @@
 //! E' = |Φ_δ| e + ∫ |exp(A σ) b| |d| dσ over [0, δ] + ρ
 //! ```
 //!
-//! of ξ, whatever is under way. Targets shrink and containment rises by E' of f, as they do by e without a delay; the guard between the samples
-//! widens the cell by E'.
+//! of ξ, whatever is under way. Targets shrink and containment rises by E' of f, as they do by e
+//! without a delay; the guard between the samples widens the cell by E'.
 
 use firmware::prediction::{MEASURED_MAX, PHI_FRACTION_BITS, RESPONSE_FRACTION_BITS};
 
 use crate::abstraction::affine::{Drift, Errors};
-use crate::synthesis::{MICRO, measurement_micro, net_power};
+use crate::drives::{expected_power, measurement_micro, net_power};
 use model::flow::{
     Flow, Matrix, Vector, absolute_integral, absolute_integral_between, apply, largest,
 };
 use model::interval::Interval;
-use model::plant::{GridPlant, STATES};
+use model::plant::{Plant, STATES};
 use model::spec::Spec;
 
-/// Room for ρ, and for states at the trigger outside the grid, in the bound of the states on which ρ rests \[micro-units\].
+/// Room for ρ, and for states at the trigger outside the grid, in the bound of the states on which
+/// ρ rests \[micro-units\].
 const ROOM: f64 = 1e6;
 
 /// The device's coefficients, as the table stores them.
@@ -110,14 +116,6 @@ pub fn ticks(spec: &Spec) -> u32 {
         .ticks_of(spec.uncertainty.actuation_delay_s.most_s())
 }
 
-/// Bound of the error of what the games know \[micro-units\]: the estimate's, or, with a delay, the prediction's (E').
-///
-/// # Errors
-/// As [`Delay::of`].
-pub fn known_within(spec: &Spec) -> Result<[f64; STATES], DelayError> {
-    Ok(Delay::of(spec)?.map_or_else(|| measurement_micro(spec), |delay| delay.effective))
-}
-
 impl Delay {
     /// The delay of a spec, if it has one.
     ///
@@ -128,7 +126,7 @@ impl Delay {
         if ticks == 0 {
             return Ok(None);
         }
-        let (a, b) = GridPlant::new(spec).matrices();
+        let (a, b) = Plant::new(spec).matrices();
         // Whole milliseconds: each time is one correctly rounded quotient.
         let seconds = |ms: u32| f64::from(ms) / 1000.0;
         let watch_ms = spec.sampling.watch_ms();
@@ -140,7 +138,9 @@ impl Delay {
         let period = Flow::over(&a, &b, period_s);
         let both = Flow::over(&a, &b, later_s);
 
-        let expected: Vec<Interval> = (0..spec.input.levels()).map(|u| nominal(spec, u)).collect();
+        let expected: Vec<Interval> = (0..spec.input.levels())
+            .map(|u| expected_power(spec, u))
+            .collect();
         let possible: Vec<Interval> = (0..spec.input.levels())
             .map(|u| net_power(spec, u))
             .collect();
@@ -199,8 +199,8 @@ impl Delay {
         }))
     }
 
-    /// What is predicted, with nothing under way, from `centre + generators radius ± spread`; `generators` are those of the prediction.
-    /// Lowest and highest \[micro-units\].
+    /// What is predicted, with nothing under way, from `centre + generators radius ± spread`;
+    /// `generators` are those of the prediction. Lowest and highest \[micro-units\].
     pub fn predicted(
         &self,
         centre: &Vector<STATES>,
@@ -252,9 +252,9 @@ impl Delay {
             }
             Ok(out)
         };
-        let loss_power = nominal(spec, 0);
+        let loss_power = expected_power(spec, 0);
         let loss = flow.gamma.map(|gamma| gamma * loss_power);
-        let level_power = nominal(spec, 1) - loss_power;
+        let level_power = expected_power(spec, 1) - loss_power;
         let mut levels = Vec::with_capacity(ticks as usize);
         let mut impulse = tick.gamma.map(|gamma| gamma * level_power);
         for _ in 0..ticks {
@@ -289,16 +289,9 @@ struct Exact {
     levels: Vec<Vector<STATES>>,
 }
 
-/// Net power under a level as the device expects it \[µGW\]: delivered as commanded, the loss in the middle of its band.
-fn nominal(spec: &Spec, level: usize) -> Interval {
-    let fleet = Interval::point(spec.fleet_power_gw()) * Interval::point(MICRO);
-    let [low, high] = spec.uncertainty.loss_gw;
-    let loss = Interval::point(0.5 * low + 0.5 * high) * Interval::point(MICRO);
-    fleet * Interval::point(spec.input.value(level)) - loss
-}
-
-/// Bound of the estimates from which the device predicts \[micro-units\], for as long as the predicted states have been in the grid: each
-/// state is at most a period after one that is within E' of the grid, or at most the delay after the trigger.
+/// Bound of the estimates from which the device predicts \[micro-units\], for as long as the
+/// predicted states have been in the grid: each state is at most a period after one that is within
+/// E' of the grid, or at most the delay after the trigger.
 fn states(
     spec: &Spec,
     (a, b): (&Matrix<STATES>, &Vector<STATES>),

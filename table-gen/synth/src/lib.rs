@@ -6,6 +6,7 @@
 //! |---|---|---|
 //! | [`abstraction`] | plant and grid | boxes of successor cells |
 //! | [`game`] | an abstraction and a target | allowed inputs and ranks |
+//! | [`drives`], [`problem`] | a spec | everything derived from it, once |
 //! | [`delay`] | a delay of the commands | what the games know then, and the device's prediction |
 //! | [`checkpoint`] | a game | a file to go on from |
 //! | [`ranks`] | a game | slabs of it on several machines |
@@ -24,10 +25,12 @@ pub mod budget;
 pub mod checkpoint;
 pub mod compress;
 pub mod delay;
+pub mod drives;
 pub mod emit;
 pub mod game;
 pub mod inspect;
 pub mod pipeline;
+pub mod problem;
 pub mod ranks;
 pub mod synthesis;
 pub mod trigonometry;

@@ -2,12 +2,14 @@
 
 use std::path::{Path, PathBuf};
 
-use firmware::table::{Law, TableError, TableView};
+use firmware::table::{TableError, TableView};
 
-use crate::compress::{self, CompressError, LawReport, Options};
+use crate::compress::{self, CompressError, CompressedLaw, Options};
 use crate::emit::{self, EmitError, dense};
 use crate::game::Watch;
+use crate::problem;
 use crate::synthesis::{self, Synthesis, SynthesisError};
+use model::hex::hex;
 use model::spec::Spec;
 
 /// Why there is no table.
@@ -44,11 +46,10 @@ pub enum PipelineError {
 fn rejection(error: TableError) -> String {
     match error {
         TableError::ForeignSpec { found, expected } => {
-            let hex = |hash: [u8; 16]| hash.iter().map(|b| format!("{b:02x}")).collect::<String>();
             format!(
                 "it was made from the spec with hash {}, this one has {}",
-                hex(found),
-                hex(expected)
+                hex(&found),
+                hex(&expected)
             )
         }
         other => format!("{other:?}"),
@@ -79,24 +80,23 @@ pub struct Emitted {
     /// The image.
     pub bytes: Vec<u8>,
     /// Law by law; empty for the dense encoding.
-    pub laws: Vec<(Law, LawReport)>,
+    pub laws: Vec<CompressedLaw>,
 }
 
-/// The table of a spec's laws.
+/// The table of the laws.
 ///
 /// # Errors
 /// Numbers that do not fit the format, or an interruption.
 pub fn emit<'w>(
-    spec: &Spec,
     synthesis: &Synthesis,
     encoding: Encoding,
     watch: &dyn Fn(&'static str) -> Box<dyn Watch + 'w>,
 ) -> Result<Emitted, PipelineError> {
-    let head = emit::head(spec, synthesis.grid)?;
+    let head = emit::head(&synthesis.problem)?;
     let options = match encoding {
         Encoding::Tree(options) => options,
         Encoding::Dense => {
-            let shape = synthesis::grid_shape(&synthesis.grid);
+            let shape = synthesis.problem.shape;
             let encode = |law: &synthesis::SolvedLaw| {
                 dense::encode(&shape, head.header.levels, &law.solution, &dense::lowest)
             };
@@ -111,14 +111,10 @@ pub fn emit<'w>(
             });
         }
     };
-    let compressed = compress::compress(spec, synthesis, &options, watch)?;
+    let compressed = compress::compress(synthesis, &options, watch)?;
     Ok(Emitted {
         bytes: emit::assemble(head, &compressed.encoded())?,
-        laws: compressed
-            .laws
-            .into_iter()
-            .map(|law| (law.law, law.report))
-            .collect(),
+        laws: compressed.laws,
     })
 }
 
@@ -127,7 +123,7 @@ pub fn emit<'w>(
 /// # Errors
 /// A spec whose laws come from games, or numbers that do not fit the format.
 pub fn response(spec: &Spec) -> Result<Vec<u8>, PipelineError> {
-    let grid = synthesis::device_grid(spec).map_err(SynthesisError::Grid)?;
+    let grid = problem::device_grid(spec).map_err(SynthesisError::from)?;
     Ok(emit::response(spec, grid)?)
 }
 
@@ -145,7 +141,7 @@ pub fn table_bytes<'w>(
             return response(spec);
         }
         let synthesis = synthesis::synthesise(spec, watch)?;
-        return Ok(emit(spec, &synthesis, Encoding::default(), watch)?.bytes);
+        return Ok(emit(&synthesis, Encoding::default(), watch)?.bytes);
     };
     let bytes = std::fs::read(path).map_err(|error| PipelineError::Read {
         path: path.to_owned(),

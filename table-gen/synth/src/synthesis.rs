@@ -16,28 +16,23 @@
 
 use std::time::Instant;
 
-use firmware::grid::{Grid, GridError};
 use firmware::units::AXIS_F;
 
 use crate::abstraction::Abstraction;
-use crate::abstraction::affine::{AbstractionError, AffineAbstraction, AffineInput, Growth};
+use crate::abstraction::affine::{AbstractionError, AffineAbstraction, Growth};
+use crate::abstraction::guard::Guard;
 use crate::abstraction::tube::TubeGuard;
-use crate::delay::{Delay, DelayError, known_within};
 use crate::game::bitset::BitSet;
 use crate::game::exchange::{Alone, Exchange};
-use crate::game::guard::Guard;
 use crate::game::reach::{may_reach, reach_shared};
 use crate::game::{GameError, LastCells, Solution, Watch, safety::safety_shared};
+use crate::problem::{Problem, ProblemError};
 use crate::ranks::slab::{Slab, WindowGuard};
 use crate::ranks::{Slabs, Transport};
 use crate::usage;
 use model::grid_shape::GridShape;
-use model::interval::Interval;
-use model::plant::{GridPlant, STATES};
+use model::plant::STATES;
 use model::spec::{Spec, Successor};
-
-/// Micro-units in a unit.
-pub const MICRO: f64 = firmware::units::MICRO as f64;
 
 /// A law's game, solved.
 #[derive(Debug, Clone)]
@@ -55,8 +50,8 @@ pub struct SolvedLaw {
 /// All laws of a spec.
 #[derive(Debug, Clone)]
 pub struct Synthesis {
-    /// The device's grid.
-    pub grid: Grid,
+    /// What was solved.
+    pub problem: Problem,
     /// Reaches I1.
     pub c1: SolvedLaw,
     /// Reaches I2; absent if I1 = I2.
@@ -84,15 +79,12 @@ impl Synthesis {
 /// Why there are no laws.
 #[derive(Debug, thiserror::Error)]
 pub enum SynthesisError {
-    /// A delay that the device cannot predict over.
+    /// The spec does not fit the device.
     #[error(transparent)]
-    Delay(#[from] DelayError),
+    Problem(#[from] ProblemError),
     /// The preferred law is always on: no game is played.
     #[error("preference.always_on is true: the law itself is the table, and no game is played")]
     Response,
-    /// The spec's grid is not one for the device.
-    #[error("the grid does not fit the device: {0:?}")]
-    Grid(GridError),
     /// The abstraction cannot be built.
     #[error(transparent)]
     Abstraction(#[from] AbstractionError),
@@ -114,135 +106,50 @@ pub enum SynthesisError {
     },
 }
 
-/// The device's grid of a spec.
+/// The abstraction of a problem's plant on its grid.
 ///
 /// # Errors
-/// As [`Grid::new`].
-pub fn device_grid(spec: &Spec) -> Result<Grid, GridError> {
-    // Counts above 65535 were refused by the spec.
-    let count = spec.grid.cell_counts().map(|n| n as u16);
-    Grid::new(
-        spec.grid.lower_edges_micro(),
-        spec.grid.widths_micro(),
-        count,
-    )
-}
-
-/// The engine's view of the device's grid, in micro-units.
-pub fn grid_shape(grid: &Grid) -> GridShape<STATES> {
-    GridShape {
-        lower: grid.lower_edge().map(f64::from),
-        width: grid.width().map(f64::from),
-        count: grid.count().map(u32::from),
-    }
-}
-
-/// Net power `P u' - w` \[µGW\] under a commanded participation: u' within the participation error,
-/// at most the whole fleet, and w within its band.
-pub fn net_power(spec: &Spec, level: usize) -> Interval {
-    let fleet = Interval::point(spec.fleet_power_gw()) * Interval::point(MICRO);
-    let u = Interval::point(spec.input.value(level));
-    let error = Interval::point(spec.uncertainty.participation);
-    let low = (u * (Interval::ONE - error)).low.max(0.0);
-    let high = (u * (Interval::ONE + error)).high.min(1.0);
-    let [loss_low, loss_high] = spec.uncertainty.loss_gw;
-    let loss = Interval::hull(loss_low, loss_high) * Interval::point(MICRO);
-    fleet * Interval::hull(low, high) - loss
-}
-
-/// Bound of the estimate's error \[micro-units\], rounded up.
-pub fn measurement_micro(spec: &Spec) -> [f64; STATES] {
-    spec.uncertainty
-        .measurement
-        .map(|e| if e == 0.0 { 0.0 } else { (e * MICRO).next_up() })
-}
-
-/// The inputs of a spec as drives of its plant.
-fn inputs(spec: &Spec) -> Vec<AffineInput<STATES>> {
-    let (a, b) = GridPlant::new(spec).matrices();
-    (0..spec.input.levels())
-        .map(|level| AffineInput {
-            a,
-            b,
-            drive: net_power(spec, level),
-        })
-        .collect()
-}
-
-/// The period \[s\], a whole number of milliseconds.
-pub fn period_s(spec: &Spec) -> f64 {
-    f64::from(spec.sampling.period_ms()) / 1000.0
-}
-
-/// The abstraction of a spec's plant on its grid.
-///
-/// # Errors
-/// As [`AffineAbstraction::new`], and a delay that the device cannot predict over.
-pub fn abstraction(spec: &Spec, grid: &Grid) -> Result<AffineAbstraction<STATES>, SynthesisError> {
-    let growth = match spec.method.successor {
+/// As [`AffineAbstraction::new`].
+pub fn abstraction(problem: &Problem) -> Result<AffineAbstraction<STATES>, AbstractionError> {
+    let growth = match problem.spec.method.successor {
         Successor::GrowthBound => Growth::GrowthBound,
         Successor::ExactLinear => Growth::ExactLinear,
     };
-    let (shape, inputs, period_s) = (grid_shape(grid), inputs(spec), period_s(spec));
-    let Some(delay) = Delay::of(spec)? else {
-        let measurement = measurement_micro(spec);
-        return Ok(AffineAbstraction::new(
-            shape,
-            &inputs,
-            period_s,
-            growth,
-            measurement,
-        )?);
+    let (shape, inputs, period_s) = (problem.shape, &problem.inputs, problem.period_s);
+    let Some(delay) = &problem.delay else {
+        return AffineAbstraction::new(shape, inputs, period_s, growth, problem.measurement);
     };
     let drifts = Some(&delay.drifts[..]);
-    let errors = delay.errors;
-    Ok(AffineAbstraction::with_drifts(
-        shape, &inputs, period_s, growth, errors, drifts,
-    )?)
+    AffineAbstraction::with_drifts(shape, inputs, period_s, growth, delay.errors, drifts)
 }
 
 /// The guard of a band \[µHz\], if the spec asks for the time between the samples and the band has
 /// an end.
-fn between_samples(
-    spec: &Spec,
-    grid: &Grid,
-    (low, high): (f64, f64),
-) -> Result<OptionalGuard, DelayError> {
+fn between_samples(problem: &Problem, [low, high]: [f64; 2]) -> OptionalGuard {
     let bounded = low.is_finite() || high.is_finite();
-    if !(spec.method.between_samples && bounded) {
-        return Ok(OptionalGuard(None));
-    }
-    Ok(OptionalGuard(Some(TubeGuard::new(
-        &grid_shape(grid),
-        &inputs(spec),
-        period_s(spec),
-        known_within(spec)?,
-        AXIS_F,
-        (low, high),
-    ))))
+    let guarded = problem.spec.method.between_samples && bounded;
+    OptionalGuard(guarded.then(|| {
+        TubeGuard::new(
+            &problem.shape,
+            &problem.inputs,
+            problem.period_s,
+            problem.known_within,
+            AXIS_F,
+            (low, high),
+        )
+    }))
 }
 
 /// The guard of C1 and C2: f stays above containment between the samples too, if the spec asks for
 /// it.
-///
-/// # Errors
-/// A delay that the device cannot predict over.
-pub fn containment_guard(spec: &Spec, grid: &Grid) -> Result<OptionalGuard, DelayError> {
-    let low = spec.requirements.containment_hz.map(containment_micro);
-    between_samples(
-        spec,
-        grid,
-        (low.unwrap_or(f64::NEG_INFINITY), f64::INFINITY),
-    )
+pub fn containment_guard(problem: &Problem) -> OptionalGuard {
+    let low = problem.containment.unwrap_or(f64::NEG_INFINITY);
+    between_samples(problem, [low, f64::INFINITY])
 }
 
 /// The guard of Hold: f stays in I2 between the samples too, if the spec asks for it.
-///
-/// # Errors
-/// A delay that the device cannot predict over.
-pub fn stay_guard(spec: &Spec, grid: &Grid) -> Result<OptionalGuard, DelayError> {
-    let [low, high] = spec.requirements.inner_micro().map(f64::from);
-    between_samples(spec, grid, (low, high))
+pub fn stay_guard(problem: &Problem) -> OptionalGuard {
+    between_samples(problem, problem.inner)
 }
 
 /// A guard, or none.
@@ -258,20 +165,8 @@ impl Guard<STATES> for OptionalGuard {
     }
 }
 
-/// Containment \[µHz\], rounded up if it is no whole number of them.
-fn containment_micro(hz: f64) -> f64 {
-    let micro = hz * MICRO;
-    // The product of a decimal and 1e6 may miss a whole number by a rounding; a thousandth of a µHz
-    // decides.
-    if (micro - micro.round()).abs() < 1e-3 {
-        micro.round()
-    } else {
-        micro.ceil()
-    }
-}
-
 /// Cells whose whole frequency interval, widened by the measurement error, lies in a band \[µHz\].
-fn cells_within(shape: &GridShape<STATES>, low: f64, high: f64, error: f64) -> BitSet {
+fn cells_within(shape: &GridShape<STATES>, [low, high]: [f64; 2], error: f64) -> BitSet {
     by_frequency(shape, |cell_low, cell_high| {
         cell_low - error >= low && cell_high + error <= high
     })
@@ -306,13 +201,13 @@ pub fn synthesise<'w>(
     if spec.preference.always_on {
         return Err(SynthesisError::Response);
     }
-    let grid = device_grid(spec).map_err(SynthesisError::Grid)?;
     let before = usage::cpu_s();
-    let abstraction = abstraction(spec, &grid)?;
-    let guards = [containment_guard(spec, &grid)?, stay_guard(spec, &grid)?];
+    let problem = Problem::new(spec)?;
+    let abstraction = abstraction(&problem)?;
+    let guards = [containment_guard(&problem), stay_guard(&problem)];
     let abstraction_cpu_s = usage::cpu_s() - before;
-    let laws = play_laws(spec, &abstraction, &guards, &Alone, watch)?;
-    Ok(laws.on(grid, abstraction_cpu_s))
+    let laws = play_laws(&problem, &abstraction, &guards, &Alone, watch)?;
+    Ok(laws.of(problem, abstraction_cpu_s))
 }
 
 /// What a rank has of a synthesis that several play.
@@ -338,10 +233,10 @@ pub fn synthesise_shared<'w>(
     transport: &impl Transport,
     watch: &dyn Fn(&'static str) -> Box<dyn Watch + 'w>,
 ) -> Result<SharedSynthesis, SynthesisError> {
-    let grid = device_grid(spec).map_err(SynthesisError::Grid)?;
     let before = usage::cpu_s();
-    let whole = abstraction(spec, &grid)?;
-    let guards = [containment_guard(spec, &grid)?, stay_guard(spec, &grid)?];
+    let problem = Problem::new(spec)?;
+    let whole = abstraction(&problem)?;
+    let guards = [containment_guard(&problem), stay_guard(&problem)];
     let slab = Slab::new(&whole, transport.rank(), transport.ranks());
     let part = slab.part();
     let slabs = Slabs::new(transport, &part).map_err(|lost| SynthesisError::Game {
@@ -352,16 +247,16 @@ pub fn synthesise_shared<'w>(
         .each_ref()
         .map(|guard| WindowGuard::new(guard, &slab));
     let abstraction_cpu_s = usage::cpu_s() - before;
-    let laws = play_laws(spec, &slab, &guards, &slabs, watch)?;
+    let laws = play_laws(&problem, &slab, &guards, &slabs, watch)?;
     Ok(SharedSynthesis {
-        laws: laws.on(grid, abstraction_cpu_s),
+        laws: laws.of(problem, abstraction_cpu_s),
         own: slabs.owned(part.window.len()),
         layer: slab.shape().strides()[STATES - 1],
         sent_bytes: slabs.sent_bytes(),
     })
 }
 
-/// The laws of a spec, before they are put beside their grid.
+/// The laws of a problem, before they are put beside it.
 struct Laws {
     c1: SolvedLaw,
     c2: Option<SolvedLaw>,
@@ -369,9 +264,9 @@ struct Laws {
 }
 
 impl Laws {
-    fn on(self, grid: Grid, abstraction_cpu_s: f64) -> Synthesis {
+    fn of(self, problem: Problem, abstraction_cpu_s: f64) -> Synthesis {
         Synthesis {
-            grid,
+            problem,
             c1: self.c1,
             c2: self.c2,
             hold: self.hold,
@@ -383,21 +278,19 @@ impl Laws {
 /// Plays the games in a window of the grid: the whole, or a rank's. The guards are those of
 /// containment and of Hold.
 fn play_laws<'w, A: Abstraction<STATES, Inputs = u32>, G: Guard<STATES>>(
-    spec: &Spec,
+    problem: &Problem,
     abstraction: &A,
     [contained, stay]: &[G; 2],
     exchange: &dyn Exchange,
     watch: &dyn Fn(&'static str) -> Box<dyn Watch + 'w>,
 ) -> Result<Laws, SynthesisError> {
+    // The window's shape, which is not the problem's on a rank.
     let shape = abstraction.shape();
-    let requirements = &spec.requirements;
-    let containment = requirements.containment_hz.map(containment_micro);
-    let error = known_within(spec)?[AXIS_F];
-    let [outer_low, outer_high] = requirements.outer_micro().map(f64::from);
-    let [inner_low, inner_high] = requirements.inner_micro().map(f64::from);
-    let outer = cells_within(shape, outer_low, outer_high, error);
-    let inner = cells_within(shape, inner_low, inner_high, error);
-    let avoid = match containment {
+    let requirements = &problem.spec.requirements;
+    let error = problem.known_within[AXIS_F];
+    let outer = cells_within(shape, problem.outer, error);
+    let inner = cells_within(shape, problem.inner, error);
+    let avoid = match problem.containment {
         None => BitSet::new(outer.len()),
         // A cell counts as contained only if its lower end, less the error, is at or above the
         // limit.

@@ -2,7 +2,7 @@
 
 use super::closed_loop::Model;
 use super::header;
-use super::tally::{Tally, Violation};
+use super::outcome::{Outcome, Violation};
 use firmware::table::{Law, TableView};
 use model::spec::Spec;
 use model::verdict::{Claim, ClaimName};
@@ -12,7 +12,7 @@ pub(super) struct Findings<'a> {
     pub(super) table: &'a TableView<'a>,
     pub(super) spec: &'a Spec,
     pub(super) model: &'a Model,
-    pub(super) tally: &'a Tally,
+    pub(super) tally: &'a Outcome,
     /// Over which time the claims are made.
     pub(super) scope: String,
 }

@@ -1,13 +1,13 @@
 //! Whether the table's header says what the spec says.
 //!
-//! The proof takes the firmware's behaviour from the header, whatever it says; this claim is that the header is the one
-//! that this spec asks for: another grid, clock, band or plant means a table for another purpose, even where it happens
-//! to meet the requirements.
+//! The proof takes the firmware's behaviour from the header, whatever it says; this claim is that
+//! the header is the one that this spec asks for: another grid, clock, band or plant means a table
+//! for another purpose, even where it happens to meet the requirements.
 
 use firmware::observer::ObserverConfig;
 use firmware::table::{Header, Law, TableView};
 
-use super::hex;
+use model::hex::hex;
 use model::spec::Spec;
 use model::table_fields::{self, FieldError};
 
@@ -41,8 +41,8 @@ pub(super) fn differences(table: &TableView<'_>, spec: &Spec) -> Vec<String> {
     out
 }
 
-/// Droop, plant, hypotheses, response and identity. The generator's version is no part of the proof,
-/// and any will do.
+/// Droop, plant, hypotheses, response and identity. The generator's version is no part of the
+/// proof, and any will do.
 fn numbers(table: &TableView<'_>, spec: &Spec, out: &mut Vec<String>) -> Result<(), FieldError> {
     let header = table.header();
     let mut same = |what: &str, found: String, expected: String| {

@@ -1,94 +1,83 @@
 //! The independent verifier: bytes of a table and a spec in, a verdict out.
 //!
-//! The closed loop of plant, firmware and table is explored forward from every state in which the event may find the
-//! grid. Quantiser, lookup and phase machine are the firmware's own; of synthesis and compression nothing is
-//! reachable from this package. Every rounding goes outward, so a claim that holds here holds for the real
-//! numbers.
+//! The closed loop of plant, firmware and table is explored forward from every state in which the
+//! event may find the grid. Quantiser, lookup and phase machine are the firmware's own; of
+//! synthesis and compression nothing is reachable from this package. Every rounding goes outward,
+//! so a claim that holds here holds for the real numbers.
 //!
 //! | step | module |
 //! |---|---|
 //! | plant, clocks and uncertainty of the closed loop | `closed_loop` |
-//! | a stretch of time with a held input, and the frequency within it | `segment` |
-//! | what the state that is decided on says of the real one, with a delay too | `knowledge` |
+//! | a stretch of time with a held input, and the frequency within it | `held_input` |
+//! | what the state that is decided on says of the real one | `estimate_error` |
+//! | the same where commands act late | `delayed_loop` |
 //! | tight sets of states | `zonotope` |
 //! | the states on which the phase machine decides alike | `regions` |
-//! | the event at an unknown moment of a tick | `event` |
-//! | tables without Hold: tight sets in time, over the horizon | `timed` |
-//! | tables with Hold: No control by tight sets, then whole cells for ever | `watching`, `closed` |
+//! | the event at an unknown moment of a tick | `first_tick` |
+//! | tables without Hold: tight sets in time, over the horizon | `tight_sets` |
+//! | tables with Hold: No control by tight sets | `no_control` |
+//! | then whole cells for ever | `closed_cells` |
 //! | the worst number of periods | `longest_path` |
 //! | claims | `claims` |
 //! | tables that are a response: always on, no laws | `response` |
 //!
 //! # What is claimed
-//! The event finds the grid in a state of `uncertainty.initial` and the firmware in No control, at any moment between
-//! two ticks. From then on loss, delivered participation and the estimate's error vary within their bounds as an
-//! adversary likes, the loss and the participation continuously in time.
+//! The event finds the grid in a state of `uncertainty.initial` and the firmware in No control, at
+//! any moment between two ticks. From then on loss, delivered participation and the estimate's
+//! error vary within their bounds as an adversary likes, the loss and the participation
+//! continuously in time.
 //!
-//! Whether I1 and I2 were left or reached is what the firmware measures at its ticks. Where commands act with a delay, it is what the
-//! firmware predicts there for the moment at which its command begins to act, and times end at that moment; bounds of f are always those of
-//! the real f.
+//! Whether I1 and I2 were left or reached is what the firmware measures at its ticks. Where
+//! commands act with a delay, it is what the firmware predicts there for the moment at which its
+//! command begins to act, and times end at that moment; bounds of f are always those of the real f.
 
 mod cellset;
 mod claims;
-mod closed;
+mod closed_cells;
 mod closed_loop;
-mod event;
+mod delayed_loop;
+mod drive;
+mod error;
+mod estimate_error;
+mod first_tick;
 mod header;
-mod knowledge;
 mod longest_path;
 
+mod held_input;
+mod no_control;
+mod outcome;
 mod path;
 mod regions;
 pub mod response;
-mod segment;
 mod successor;
-mod tally;
 #[cfg(test)]
 mod tests;
-mod timed;
-mod watching;
+mod tight_sets;
 mod zonotope;
 
+pub use error::VerifyError;
+
+use model::hex::hex;
 use model::verdict::{Claim, ClaimName, Counterexample, Counts, Method, Verdict};
 
-use firmware::table::{TableError, TableView};
+use firmware::table::TableView;
 use sha2::{Digest, Sha256};
 
 use claims::Findings;
-use closed_loop::Model;
 use model::spec::Spec;
+use outcome::{Outcome, Violation};
 use regions::Regions;
-use tally::{Tally, Violation};
 
-/// Horizon \[s\] over which a table without Hold is explored where the spec asks for ever: it cannot be proven then, but
-/// a violation can be found.
+/// Horizon \[s\] over which a table without Hold is explored where the spec asks for ever: it
+/// cannot be proven then, but a violation can be found.
 const OPEN_HORIZON_S: f64 = 300.0;
 
-/// Why there is no verdict.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub enum VerifyError {
-    /// The firmware rejects the table.
-    #[error("the firmware rejects the table: {0:?}")]
-    Table(TableError),
-    /// A part of the spec that the verifier does not cover.
-    #[error("{key} = {found}: not covered by the verifier; {remedy}")]
-    Unsupported {
-        /// The spec's key.
-        key: &'static str,
-        /// Its value.
-        found: String,
-        /// What is covered.
-        remedy: &'static str,
-    },
-    /// The observer ended it.
-    #[error("interrupted")]
-    Interrupted,
-}
-
-/// Examines a table against a spec. `go_on` is told how much is done, in \[0, 1\] and roughly, and may end it.
+/// Examines a table against a spec. `go_on` is told how much is done, in \[0, 1\] and roughly, and
+/// may end it.
 ///
 /// # Errors
-/// A table that the firmware rejects, a spec that is not covered, or an end by `go_on`. A claim that fails is a result.
+/// A table that the firmware rejects, a spec that is not covered, or an end by `go_on`. A claim
+/// that fails is a result.
 pub fn verify(
     bytes: &[u8],
     spec: &Spec,
@@ -99,33 +88,29 @@ pub fn verify(
         return of_response(&table, spec, go_on);
     }
     let header = table.header();
-    let model = Model::new(&table, spec);
+    let model = delayed_loop::closed_loop(&table, spec);
     let regions = Regions::new(header, model.error);
-    let [first, real, from] = [
-        model.knowledge.first,
-        model.knowledge.real,
-        model.knowledge.before,
-    ]
-    .map(|error| Regions::new(header, error));
+    let [first, real, from] = [model.known.first, model.known.real, model.known.before]
+        .map(|error| Regions::new(header, error));
     let settle_ticks = (spec.requirements.settle_within_s / model.tick_s).floor() as u32;
     let [low, high] = spec.requirements.inner_hz;
     let inner = closed_loop::micro(low).join(closed_loop::micro(high));
     let mut counts = Counts::default();
-    let (tally, reachable_cells, method, scope) = if let Some(limit) = &model.knowledge.limit {
-        let tally = Tally {
+    let (tally, reachable_cells, method, scope) = if let Some(limit) = &model.known.limit {
+        let tally = Outcome {
             limit: Some(limit.clone()),
-            ..Tally::default()
+            ..Outcome::default()
         };
         (tally, 0, Method::NotExplored, String::new())
     } else if header.stay {
-        let job = closed::Closed {
+        let job = closed_cells::ClosedCells {
             table: &table,
             model: &model,
             real: &real,
             from: &from,
             inner,
         };
-        let watching = watching::Watching {
+        let watching = no_control::NoControl {
             table: &table,
             model: &model,
             regions: &regions,
@@ -137,7 +122,7 @@ pub fn verify(
     } else {
         let horizon_s = spec.requirements.horizon_s;
         let ticks = (horizon_s.unwrap_or(OPEN_HORIZON_S) / model.tick_s).ceil() as u32;
-        let explored = timed::Timed::new(&table, &model, [&regions, &real], settle_ticks)
+        let explored = tight_sets::TightSets::new(&table, &model, [&regions, &real], settle_ticks)
             .run(ticks, go_on)
             .ok_or(VerifyError::Interrupted)?;
         let mut tally = explored.tally;
@@ -224,12 +209,12 @@ fn of_response(
 
 /// No control by tight sets, then the closed set of cells.
 fn for_ever(
-    job: &closed::Closed<'_>,
-    watching: &watching::Watching<'_>,
+    job: &closed_cells::ClosedCells<'_>,
+    watching: &no_control::NoControl<'_>,
     counts: &mut Counts,
     go_on: &dyn Fn(f64) -> bool,
-) -> Option<(Tally, u64)> {
-    let mut tally = Tally::default();
+) -> Option<(Outcome, u64)> {
+    let mut tally = Outcome::default();
     let watched = watching.watch(&mut tally);
     counts.sets = watched.traces.len() as u64;
     counts.first_cells = watched.seeds.len() as u64;
@@ -239,7 +224,8 @@ fn for_ever(
         None => Vec::new(),
     };
     let cells = job.run(seeds, &seed_path, &mut tally, go_on)?;
-    // From the last tick inside I1 to the first decision, then the periods, then until Hold's first command acts.
+    // From the last tick inside I1 to the first decision, then the periods, then until Hold's first
+    // command acts.
     let settle = 1 + tally.periods * job.model.period_ticks + job.model.delay_ticks();
     tally.settle_ticks = settle;
     if let Some(last) = watched.last_tick
@@ -254,7 +240,7 @@ fn for_ever(
 }
 
 /// The first failure of each kind, as sets.
-fn failures(tally: &Tally, tick_s: f64) -> Vec<Counterexample> {
+fn failures(tally: &Outcome, tick_s: f64) -> Vec<Counterexample> {
     let violations = tally.violations.iter();
     violations
         .map(|(kind, found)| Counterexample {
@@ -270,8 +256,4 @@ fn failures(tally: &Tally, tick_s: f64) -> Vec<Counterexample> {
             real: None,
         })
         .collect()
-}
-
-fn hex(bytes: &[u8]) -> String {
-    bytes.iter().map(|byte| format!("{byte:02x}")).collect()
 }

@@ -1,7 +1,8 @@
 //! The worst number of periods until Hold: the longest path of the cell graph, found backwards.
 //!
-//! A cell is *done in k* periods if its whole box is done in k-1; Hold cells are done in 0. The sweeps stop when none
-//! is left (the number of sweeps is the longest path) or when none can be added (the rest can go round for ever).
+//! A cell is *done in k* periods if its whole box is done in k-1; Hold cells are done in 0. The
+//! sweeps stop when none is left (the number of sweeps is the longest path) or when none can be
+//! added (the rest can go round for ever).
 
 use firmware::grid::Grid;
 use firmware::phase::Phase;

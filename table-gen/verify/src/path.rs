@@ -56,7 +56,8 @@ impl Traces {
         self.steps.len()
     }
 
-    /// The path that ends in a step, from the event on. Watching ticks in which nothing changed are left out.
+    /// The path that ends in a step, from the event on. NoControl ticks in which nothing changed
+    /// are left out.
     pub(crate) fn path(&self, last: u32) -> Vec<PathStep> {
         let mut path: Vec<PathStep> = Vec::new();
         let mut at = Some(last);

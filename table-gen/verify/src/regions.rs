@@ -1,8 +1,9 @@
 //! The states on which the phase machine decides alike.
 //!
-//! A decision depends on the cell of the measured state and on whether its frequency lies in I1 and I2. So the cell
-//! edges of every axis, and on the frequency axis the edges of the bands as well, cut the states into regions on each of
-//! which one representative state stands for all: the firmware's own phase machine is asked for that one.
+//! A decision depends on the cell of the measured state and on whether its frequency lies in I1 and
+//! I2. So the cell edges of every axis, and on the frequency axis the edges of the bands as well,
+//! cut the states into regions on each of which one representative state stands for all: the
+//! firmware's own phase machine is asked for that one.
 
 use firmware::phase::Phase;
 use firmware::table::Header;
@@ -42,7 +43,8 @@ impl Regions {
                 .map(|i| (lower + width * i) as i32)
                 .collect()
         });
-        // A stored frequency is in the band up to and including `high`: the next integer is the first outside.
+        // A stored frequency is in the band up to and including `high`: the next integer is the
+        // first outside.
         let ends = |band: &Band| [band.low_uhz, band.high_uhz.saturating_add(1)];
         let (outer, inner) = (ends(&header.outer), ends(&header.inner));
         let mut bands = [outer, inner].concat();
@@ -64,7 +66,8 @@ impl Regions {
     /// representatives lie within the set's bounds.
     pub(super) fn by_band(&self, set: &Zonotope, phase: Phase) -> Vec<Part> {
         let band = match phase {
-            // No control ends below I1 alone: one edge, so that the sets that stay are not cut in two.
+            // No control ends below I1 alone: one edge, so that the sets that stay are not cut in
+            // two.
             Phase::NoControl => &self.outer[..1],
             _ => &self.inner[..],
         };
@@ -91,7 +94,8 @@ impl Regions {
         parts
     }
 
-    /// Representatives of a cell, one for each band region that it meets, and the real frequencies \[µHz\] of each.
+    /// Representatives of a cell, one for each band region that it meets, and the real frequencies
+    /// \[µHz\] of each.
     pub(super) fn within(&self, bounds: &[(i32, i32); STATES]) -> Vec<(State, Interval)> {
         let (low, high) = bounds[AXIS_F];
         let mut starts = vec![low];

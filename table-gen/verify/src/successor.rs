@@ -1,9 +1,10 @@
-//! Where a whole cell goes in one period, recomputed from the plant: nothing is shared with the games.
+//! Where a whole cell goes in one period, recomputed from the plant: nothing is shared with the
+//! games.
 
 use firmware::grid::Grid;
 
 use super::closed_loop::Model;
-use super::knowledge::Drift;
+use super::estimate_error::PeriodEffect;
 use model::interval::Interval;
 use model::plant::STATES;
 
@@ -14,13 +15,14 @@ pub(super) struct Cells {
     pub(super) high: [u16; STATES],
 }
 
-/// The cells in which the next decision's state may lie a period after this one's was in a box, which holds the errors before the way
-/// ([`super::knowledge`]); `None` if some lie outside the grid.
+/// The cells in which the next decision's state may lie a period after this one's was in a box,
+/// which holds the errors before the way ([`super::estimate_error`]); `None` if some lie outside
+/// the grid.
 pub(super) fn successor(
     grid: &Grid,
     model: &Model,
     from: &[Interval; STATES],
-    drift: &Drift,
+    drift: &PeriodEffect,
 ) -> Option<Cells> {
     let mut cells = Cells {
         low: [0; STATES],
@@ -44,8 +46,8 @@ pub(super) fn index(grid: &Grid, axis: usize, value: f64) -> Option<u16> {
     let lower = f64::from(grid.lower_edge()[axis]);
     let width = f64::from(grid.width()[axis]);
     let guess = ((value - lower) / width).floor();
-    // The guess may be off by one where the quotient rounds to a whole number; edges are whole numbers below 2^32, so
-    // the comparisons are exact.
+    // The guess may be off by one where the quotient rounds to a whole number; edges are whole
+    // numbers below 2^32, so the comparisons are exact.
     let edge = |i: f64| lower + i * width;
     let exact = if edge(guess) > value {
         guess - 1.0

@@ -1,19 +1,22 @@
-//! Tight sets of states: a zonotope with a box of slack, `{ c + G α + β : |α_j| <= 1, |β_i| <= slack_i }`, cut by a box.
+//! Tight sets of states: a zonotope with a box of slack, `{ c + G α + β : |α_j| <= 1, |β_i| <=
+//! slack_i }`, cut by a box.
 //!
-//! Linear flows map a zonotope to a zonotope exactly; what floating point loses goes into the slack. Cutting by
-//! `low <= x_i <= high` shrinks the intervals of the coefficients α (a sound over-approximation of the cut, exact for
-//! a single generator, which is what the unknown moment of the event gives). With several generators each can make up
-//! for another and little shrinks; the box remembers the cut, and one step later it still bounds what matters.
+//! Linear flows map a zonotope to a zonotope exactly; what floating point loses goes into the
+//! slack. Cutting by `low <= x_i <= high` shrinks the intervals of the coefficients α (a sound
+//! over-approximation of the cut, exact for a single generator, which is what the unknown moment of
+//! the event gives). With several generators each can make up for another and little shrinks; the
+//! box remembers the cut, and one step later it still bounds what matters.
 
-use super::closed_loop::Drive;
-use super::segment::{Linear, Segment};
+use super::drive::Drive;
+use super::held_input::{HeldInput, Linear};
 use model::flow::Vector;
 use model::interval::Interval;
 use model::plant::STATES;
 
 /// Most generators that are kept; the smallest beyond are boxed.
 const GENERATORS_MAX: usize = 32;
-/// Slack \[micro-units\] from which a box of disturbance is carried as generators, so that it rotates with the flow.
+/// Slack \[micro-units\] from which a box of disturbance is carried as generators, so that it
+/// rotates with the flow.
 const SLACK_MAX: f64 = 1e-3;
 /// Rounds of contraction of a cut; each costs one pass over generators and axes.
 const ROUNDS_MAX: u32 = 4;
@@ -77,8 +80,8 @@ impl Zonotope {
         out
     }
 
-    /// The hull of this set under two flows and everything on the chords between their images, widened by a box:
-    /// `{ (1-θ) x + θ y }` for x and y the images of one point.
+    /// The hull of this set under two flows and everything on the chords between their images,
+    /// widened by a box: `{ (1-θ) x + θ y }` for x and y the images of one point.
     pub(super) fn chord(start: &Self, end: &Self, widen: [f64; STATES]) -> Self {
         let mut out = Self {
             centre: [0.0; STATES],
@@ -98,7 +101,8 @@ impl Zonotope {
             let slack = start.slack[d].max(end.slack[d]);
             out.slack[d] = (out.slack[d] + (slack + widen[d]).next_up()).next_up();
         }
-        // The generators of both are the images of the same ones; half their difference is the error of their mean.
+        // The generators of both are the images of the same ones; half their difference is the
+        // error of their mean.
         for (a, b) in start.generators.iter().zip(&end.generators) {
             let mut mean = [0.0; STATES];
             for d in 0..STATES {
@@ -115,8 +119,9 @@ impl Zonotope {
         out
     }
 
-    /// The states at the end of a segment; the generators keep their order and number, the slack takes the rest.
-    pub(super) fn flown(&self, segment: &Segment, drive: Drive) -> Self {
+    /// The states at the end of a segment; the generators keep their order and number, the slack
+    /// takes the rest.
+    pub(super) fn flown(&self, segment: &HeldInput, drive: Drive) -> Self {
         let phi = &segment.flow.phi;
         let mut out = Self {
             centre: [0.0; STATES],
@@ -153,7 +158,7 @@ impl Zonotope {
     }
 
     /// [`Zonotope::flown`], tidied: large slack becomes generators, many generators become fewer.
-    pub(super) fn after(&self, segment: &Segment, drive: Drive) -> Self {
+    pub(super) fn after(&self, segment: &HeldInput, drive: Drive) -> Self {
         let mut out = self.flown(segment, drive);
         out.tidy();
         out

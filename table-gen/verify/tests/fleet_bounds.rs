@@ -8,7 +8,7 @@
 
 use firmware::response::{LevelOffset, Response, ResponseLaw};
 use model::interval::Interval;
-use model::plant::GridPlant;
+use model::plant::Plant;
 use rand::RngExt;
 use rand_pcg::Pcg64;
 use rand_pcg::rand_core::SeedableRng;
@@ -38,8 +38,8 @@ const LAW: ResponseLaw = ResponseLaw {
     smallest_change_ppm: 50_000,
 };
 
-fn plant() -> GridPlant {
-    GridPlant {
+fn plant() -> Plant {
+    Plant {
         governor_gain: -5.0,
         governor_time: 2.5,
         turbine_time: 0.5,

@@ -9,8 +9,8 @@ use std::process::{Command, ExitCode};
 
 use model::spec::Spec;
 use synth::abstraction::Abstraction;
+use synth::abstraction::guard::Unguarded;
 use synth::game::Unwatched;
-use synth::game::guard::Unguarded;
 use synth::game::reach::reach;
 use synth::game::safety::safety;
 use synth::yardsticks::{boost_converter, two_areas, unicycle};
@@ -190,7 +190,7 @@ fn play_paper() -> Result<Found, Box<dyn Error>> {
     let before = usage::cpu_s();
     let synthesis = synthesis::synthesise(&spec, &|_| Box::new(Unwatched))?;
     Ok(Found {
-        cells: synthesis.grid.cells() as usize,
+        cells: synthesis.problem.grid.cells() as usize,
         inputs: spec.input.levels(),
         winning: synthesis
             .all()

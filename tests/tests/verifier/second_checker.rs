@@ -12,7 +12,7 @@ use firmware::phase::{Decision, Phase, PhaseState};
 use firmware::table::TableView;
 use firmware::units::State;
 
-use model::plant::{GridPlant, STATES};
+use model::plant::{Plant, STATES};
 use model::spec::Spec;
 use model::verdict::ClaimName;
 
@@ -33,7 +33,7 @@ struct Checker {
 
 impl Checker {
     fn new(spec: &Spec) -> Self {
-        let (a, b) = GridPlant::new(spec).matrices_f64();
+        let (a, b) = Plant::new(spec).matrices_f64();
         let h = spec.sampling.period_s / FINE as f64;
         let rate = |x: &[f64; STATES], v: f64| -> [f64; STATES] {
             std::array::from_fn(|i| (0..STATES).map(|j| a[i][j] * x[j]).sum::<f64>() + b[i] * v)
@@ -198,7 +198,7 @@ fn a_second_checker_agrees_on_a_small_table() {
 /// The cell of the first decision of a trajectory with initial state, moment and loss drawn from
 /// `n`.
 fn first_decision(spec: &Spec, table: &TableView<'_>, n: u32) -> Option<[u16; 4]> {
-    let plant = GridPlant::new(spec);
+    let plant = Plant::new(spec);
     let share = |k: u32| f64::from(n.wrapping_mul(2_654_435_761).rotate_left(k) % 1000) / 999.0;
     let initial = &spec.uncertainty.initial;
     let mut x: [f64; STATES] = std::array::from_fn(|d| {

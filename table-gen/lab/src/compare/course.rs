@@ -3,12 +3,12 @@
 //! The plant takes exact steps of a part of a tick, over each of which the fleet's power is constant. The chargers watch a
 //! quiet grid before the event. The limit responds between two steps, at the moment itself.
 
-use super::Outcome;
 use super::chargers::{Chargers, PARTS};
+use super::outcome::Outcome;
 use crate::simulation::NOMINAL_HZ;
 use crate::simulation::closed_loop::measured;
 use crate::simulation::monitor::{Knot, Monitor};
-use model::plant::{GridPlant, STATES};
+use model::plant::{Plant, STATES};
 use model::propagator::Propagator;
 use model::spec::Spec;
 
@@ -22,7 +22,7 @@ const HALVINGS: u32 = 30;
 /// A run that goes on.
 #[derive(Debug, Clone)]
 pub struct Course {
-    plant: GridPlant,
+    plant: Plant,
     part_s: f64,
     parts: usize,
     step: Propagator,
@@ -37,13 +37,7 @@ pub struct Course {
 
 impl Course {
     /// A loss \[GW\] at time 0 on a plant, from the middle of the spec's initial box.
-    pub fn new(
-        spec: &Spec,
-        plant: &GridPlant,
-        tick_ms: u16,
-        duration_s: f64,
-        loss_gw: f64,
-    ) -> Self {
+    pub fn new(spec: &Spec, plant: &Plant, tick_ms: u16, duration_s: f64, loss_gw: f64) -> Self {
         let part_s = f64::from(tick_ms) / 1000.0 / PARTS as f64;
         let initial = &spec.uncertainty.initial;
         Self {
@@ -169,7 +163,7 @@ mod tests {
 
     fn course(loss_gw: f64) -> Course {
         let spec = Spec::default();
-        Course::new(&spec, &GridPlant::new(&spec), 100, 300.0, loss_gw)
+        Course::new(&spec, &Plant::new(&spec), 100, 300.0, loss_gw)
     }
 
     /// Numbers of an independent program (scipy), four digits.

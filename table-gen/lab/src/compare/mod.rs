@@ -15,6 +15,7 @@
 
 pub mod chargers;
 pub mod course;
+mod outcome;
 pub mod verdict;
 
 use firmware::table::TableView;
@@ -23,8 +24,9 @@ use serde::Serialize;
 
 use chargers::{ChargersConfig, Kind};
 use course::Course;
-use model::plant::GridPlant;
+use model::plant::Plant;
 use model::spec::Spec;
+pub use outcome::Outcome;
 
 /// Losses of the scorecard unless asked otherwise: first, last and step, in tenths of a GW.
 pub const LOSSES_TENTHS: (u32, u32) = (3, 28);
@@ -109,27 +111,6 @@ pub struct Row {
     pub outcome: Outcome,
 }
 
-/// What a run is judged by.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Outcome {
-    /// Lowest frequency \[Hz, absolute\].
-    pub nadir_hz: f64,
-    /// When \[s after the event\].
-    pub nadir_time_s: f64,
-    /// Frequency at the end \[Hz, absolute\].
-    pub final_hz: f64,
-    /// Time below 49.5 Hz \[s\].
-    pub seconds_below_49_5: f64,
-    /// Energy that the fleet gave \[GW s\].
-    pub participation_gw_s: f64,
-    /// Changes of a charger's command by 5 % of full scale and more, on average.
-    pub changes_per_charger: f64,
-    /// The most of any charger.
-    pub changes_most: u32,
-    /// Highest less lowest frequency from 60 s on \[Hz\].
-    pub ripple_hz: f64,
-}
-
 /// All runs: by inertia, then loss, then controller.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Scorecard {
@@ -170,9 +151,9 @@ pub fn compare(
             if !go_on() {
                 return Err(CompareError::Interrupted);
             }
-            let plant = GridPlant {
+            let plant = Plant {
                 inertia,
-                ..GridPlant::new(spec)
+                ..Plant::new(spec)
             };
             Ok(Row {
                 loss_gw,
@@ -190,7 +171,7 @@ fn run(
     spec: &Spec,
     table: &TableView<'_>,
     config: &CompareConfig,
-    plant: &GridPlant,
+    plant: &Plant,
     (loss_gw, controller): (f64, Controller),
 ) -> Result<Outcome, CompareError> {
     let tick_ms = table.header().tick_ms;

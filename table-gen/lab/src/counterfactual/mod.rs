@@ -1,9 +1,11 @@
-//! A recorded event, counterfactually: what would the frequency have been if the fleet had responded?
+//! A recorded event, counterfactually: what would the frequency have been if the fleet had
+//! responded?
 //!
-//! The power that was missing is inferred from the record through the plant ([`smoother`]), and the plant runs once more with
-//! it, now with the firmware in the loop, which sees the frequency alone ([`rerun`]). The answer inherits the plant, so it is
-//! given for two: the spec's, whose governors answer without limit, and one whose governors stop at the response that was
-//! held on the day. [`LIMITS`] says what neither knows.
+//! The power that was missing is inferred from the record through the plant ([`smoother`]), and the
+//! plant runs once more with it, now with the firmware in the loop, which sees the frequency alone
+//! ([`rerun`]). The answer inherits the plant, so it is given for two: the spec's, whose governors
+//! answer without limit, and one whose governors stop at the response that was held on the day.
+//! [`LIMITS`] says what neither knows.
 
 pub mod rerun;
 pub mod smoother;
@@ -23,14 +25,15 @@ use crate::simulation::closed_loop::LoopError;
 use crate::simulation::monitor::Summary;
 use crate::simulation::monte_carlo::statistics::Quantiles;
 use crate::simulation::recorder::History;
-use model::plant::GridPlant;
+use model::plant::Plant;
 use model::spec::Spec;
 use rerun::Rerun;
 use smoother::{Disturbance, Smoother};
 
 /// Where the low-frequency relays begin to disconnect demand \[Hz\].
 pub const RELAY_HZ: f64 = 48.8;
-/// Levels that chargers could have kept the frequency above \[Hz\]: the containment, and the relays.
+/// Levels that chargers could have kept the frequency above \[Hz\]: the containment, and the
+/// relays.
 pub const LEVELS_HZ: [f64; 2] = [49.2, RELAY_HZ];
 /// Fleet powers tried for the levels \[GW\]: in steps of this, up to [`FLEET_MAX_GW`].
 const FLEET_STEP_GW: f64 = 0.05;
@@ -87,7 +90,8 @@ pub struct Question {
 }
 
 impl Question {
-    /// The paper's two fleets on 9 August 2019: about 1 GW of demand was disconnected, and about 1 GW of response was held.
+    /// The paper's two fleets on 9 August 2019: about 1 GW of demand was disconnected, and about 1
+    /// GW of response was held.
     pub const PAPER: Self = Self {
         fleets_gw: Cow::Borrowed(&[0.7, 1.4]),
         relieved_gw: 1.0,
@@ -115,7 +119,8 @@ pub struct FleetAnswer {
 pub struct LevelAnswer {
     /// The level \[Hz\].
     pub level_hz: f64,
-    /// Power of the fleet from which on every larger one tried keeps it \[GW\]; `null` if none up to 5 GW does.
+    /// Power of the fleet from which on every larger one tried keeps it \[GW\]; `null` if none up
+    /// to 5 GW does.
     pub fleet_gw: Option<f64>,
     /// The same in chargers of the spec's power.
     pub chargers: Option<u64>,
@@ -244,7 +249,7 @@ fn on_plant(
     question: &Question,
 ) -> Result<PlantAnswer, LoopError> {
     let deviations: Vec<f64> = recorded.iter().map(|(_, f)| f - NOMINAL_HZ).collect();
-    let plant = GridPlant::new(rerun.spec);
+    let plant = Plant::new(rerun.spec);
     let smoother = Smoother::fit(&plant, rerun.governor, &deviations, rerun.step_s);
     let known = smoother.smooth(&deviations);
     let mut history = History::default();
@@ -321,8 +326,8 @@ fn chargers(spec: &Spec, fleet_gw: f64) -> u64 {
     (fleet_gw * 1e6 / spec.fleet.power_per_charger_kw).ceil() as u64
 }
 
-/// For each level the fleet from which on every larger one tried keeps the frequency above it. A scan, no bisection: more
-/// chargers are not always better under a law that switches.
+/// For each level the fleet from which on every larger one tried keeps the frequency above it. A
+/// scan, no bisection: more chargers are not always better under a law that switches.
 fn levels(
     rerun: &Rerun<'_>,
     known: &Disturbance,

@@ -3,14 +3,14 @@
 use firmware::table::TableView;
 
 use super::smoother::Disturbance;
-use crate::simulation::beyond::grid::BeyondGrid;
 use crate::simulation::beyond::plant::BeyondPlant;
+use crate::simulation::beyond::system::BeyondSystem;
 use crate::simulation::beyond::{DemandNoise, Disturbances, Governor, Loss};
 use crate::simulation::closed_loop::{ClosedLoop, Estimator, LoopError};
 use crate::simulation::monitor::Summary;
 use crate::simulation::recorder::Recorder;
 use crate::simulation::scenario::Scenario;
-use model::plant::GridPlant;
+use model::plant::Plant;
 use model::spec::Spec;
 
 /// What a run needs besides the disturbance.
@@ -27,7 +27,8 @@ pub struct Rerun<'a> {
 }
 
 impl Rerun<'_> {
-    /// The event with a fleet of this power \[GW\]; from the sample `relay` on `put_back_gw` more are missing.
+    /// The event with a fleet of this power \[GW\]; from the sample `relay` on `put_back_gw` more
+    /// are missing.
     ///
     /// # Errors
     /// A plant that the observer cannot follow.
@@ -70,9 +71,9 @@ impl Rerun<'_> {
             initial: disturbance.initial,
             ..Scenario::of(&spec)
         };
-        let plant = BeyondPlant::new(GridPlant::new(&spec), &disturbances, 0.0, 0);
+        let plant = BeyondPlant::new(Plant::new(&spec), &disturbances, 0.0, 0);
         let (_, parts) = closed_loop.parts(&scenario);
-        let mut grid = BeyondGrid::new(plant, parts, disturbance.initial);
+        let mut grid = BeyondSystem::new(plant, parts, disturbance.initial);
         Ok(closed_loop.run_on(&mut grid, &scenario, recorder))
     }
 }

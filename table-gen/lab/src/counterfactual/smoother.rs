@@ -1,15 +1,18 @@
-//! The disturbance behind a recorded frequency: an inverse filter of the plant, regularised by a random walk.
+//! The disturbance behind a recorded frequency: an inverse filter of the plant, regularised by a
+//! random walk.
 //!
-//! The governors' chain is driven by the frequency alone, so its output p follows from the record, with whatever limits the
-//! governors have. What is left is linear, with one step a sample:
+//! The governors' chain is driven by the frequency alone, so its output p follows from the record,
+//! with whatever limits the governors have. What is left is linear, with one step a sample:
 //!
 //! ```text
 //! f⁺ = a f + b (p - d)        d⁺ = d + q ξ        y = f + σ η        a = exp(-D h / 2H),  b = (1 - a) / D
 //! ```
 //!
-//! ξ and η standard normal; d is the missing power \[GW\], constant over a step, and p its mean over the step. The Kalman
-//! filter and the smoother of Durbin and Koopman (Time Series Analysis by State Space Methods, section 4.4; no matrix is
-//! inverted) give mean and variance of d given the whole record; q is that of the greatest likelihood on a grid. Draws from the posterior are made by their simulation smoother (section 4.9).
+//! ξ and η standard normal; d is the missing power \[GW\], constant over a step, and p its mean
+//! over the step. The Kalman filter and the smoother of Durbin and Koopman (Time Series Analysis by
+//! State Space Methods, section 4.4; no matrix is inverted) give mean and variance of d given the
+//! whole record; q is that of the greatest likelihood on a grid. Draws from the posterior are made
+//! by their simulation smoother (section 4.9).
 
 use nalgebra::{SMatrix, SVector};
 use rand_pcg::Pcg64;
@@ -17,7 +20,7 @@ use rand_pcg::Pcg64;
 use crate::simulation::beyond::plant::{BeyondPlant, runge_kutta};
 use crate::simulation::beyond::{Disturbances, Governor};
 use crate::simulation::chance::unit;
-use model::plant::{GridPlant, STATES};
+use model::plant::{Plant, STATES};
 
 /// f and d.
 const SIZE: usize = 2;
@@ -32,11 +35,13 @@ const CHAIN_STEPS: usize = 100;
 const WALKS_GW: [f64; 14] = [
     0.003, 0.005, 0.008, 0.013, 0.02, 0.03, 0.05, 0.08, 0.13, 0.2, 0.3, 0.5, 0.8, 1.3,
 ];
-/// Standard deviation of a reading \[Hz\]: records are published to 1 mHz, and the moment of a sample within its second is
-/// not known to better than some milliseconds of a fall of 0.15 Hz/s. It is not fitted: losses are jumps, no Gaussian walk,
-/// and the likelihood would rather call the readings bad.
+/// Standard deviation of a reading \[Hz\]: records are published to 1 mHz, and the moment of a
+/// sample within its second is not known to better than some milliseconds of a fall of 0.15 Hz/s.
+/// It is not fitted: losses are jumps, no Gaussian walk, and the likelihood would rather call the
+/// readings bad.
 const READING_HZ: f64 = 0.002;
-/// Doubt about f \[Hz\] and d \[GW\] at the start, standard deviations. The grid is taken to have been there for long.
+/// Doubt about f \[Hz\] and d \[GW\] at the start, standard deviations. The grid is taken to have
+/// been there for long.
 const START_HZ: f64 = 0.005;
 const START_GW: f64 = 0.3;
 
@@ -68,7 +73,7 @@ pub struct Disturbance {
 }
 
 /// Mean output of the governors' chain over the step after each sample, for the recorded frequency.
-fn chain(plant: &GridPlant, governor: Governor, deviations: &[f64], step_s: f64) -> Vec<f64> {
+fn chain(plant: &Plant, governor: Governor, deviations: &[f64], step_s: f64) -> Vec<f64> {
     let disturbances = Disturbances {
         governor,
         ..Disturbances::step(0.0)
@@ -105,15 +110,16 @@ fn chain(plant: &GridPlant, governor: Governor, deviations: &[f64], step_s: f64)
 }
 
 /// Output of governors that have been at a deviation for long \[GW\].
-fn rest(plant: &GridPlant, governor: Governor, f: f64) -> f64 {
+fn rest(plant: &Plant, governor: Governor, f: f64) -> f64 {
     let seen = f - f.clamp(-governor.deadband_hz, governor.deadband_hz);
     let [low, high] = governor.output_gw;
     (plant.governor_gain * seen).clamp(low, high)
 }
 
 impl Smoother {
-    /// The model for deviations from nominal \[Hz\] a time \[s\] apart, with the likeliest q. There is at least one sample.
-    pub fn fit(plant: &GridPlant, governor: Governor, deviations: &[f64], step_s: f64) -> Self {
+    /// The model for deviations from nominal \[Hz\] a time \[s\] apart, with the likeliest q. There
+    /// is at least one sample.
+    pub fn fit(plant: &Plant, governor: Governor, deviations: &[f64], step_s: f64) -> Self {
         let twice_inertia = 2.0 * plant.inertia;
         let kept = (-plant.damping * step_s / twice_inertia).exp();
         let b = if plant.damping > 0.0 {
@@ -231,7 +237,8 @@ impl Smoother {
         }
     }
 
-    /// A draw of the disturbance from what is known of it; `known` is [`Smoother::smooth`] of the same record.
+    /// A draw of the disturbance from what is known of it; `known` is [`Smoother::smooth`] of the
+    /// same record.
     pub fn draw(&self, known: &Disturbance, random: &mut Pcg64) -> Disturbance {
         let mut normal = || {
             // Box and Muller; 1 - u lies in (0, 1].
@@ -271,7 +278,7 @@ mod tests {
 
     #[test]
     fn a_known_loss_is_found_within_its_own_bounds() {
-        let plant = GridPlant::new(&Spec::load("paper-bi", &[]).unwrap());
+        let plant = Plant::new(&Spec::load("paper-bi", &[]).unwrap());
         let step = model::propagator::Propagator::new(&plant, 1.0);
         let mut random = Pcg64::seed_from_u64(5);
         let mut x = [0.0; STATES];
@@ -284,7 +291,8 @@ mod tests {
         }
         let smoother = Smoother::fit(&plant, Governor::LINEAR, &readings, 1.0);
         let found = smoother.smooth(&readings);
-        // Five standard deviations at each of 200 samples; the jump itself is no random walk and is left out by 3 s.
+        // Five standard deviations at each of 200 samples; the jump itself is no random walk and is
+        // left out by 3 s.
         for (k, loss) in truth.iter().enumerate() {
             if (47..53).contains(&k) || k > 196 {
                 continue;
@@ -302,7 +310,7 @@ mod tests {
 
     #[test]
     fn draws_scatter_as_the_smoother_says() {
-        let plant = GridPlant::new(&Spec::load("paper-bi", &[]).unwrap());
+        let plant = Plant::new(&Spec::load("paper-bi", &[]).unwrap());
         let readings = vec![0.0; 60];
         let mut smoother = Smoother::fit(&plant, Governor::LINEAR, &readings, 1.0);
         (smoother.walk_gw, smoother.reading_hz) = (0.05, 0.002);
@@ -318,7 +326,8 @@ mod tests {
         let mean = sum / f64::from(draws);
         let deviation = (squares / f64::from(draws) - mean * mean).sqrt();
         let (expected, stated) = (known.missing_gw[30], known.deviation_gw[30]);
-        // Standard errors: of the mean σ / √2000 = 2.2 %, of the deviation σ / √4000 = 1.6 %; four of each.
+        // Standard errors: of the mean σ / √2000 = 2.2 %, of the deviation σ / √4000 = 1.6 %; four
+        // of each.
         assert!((mean - expected).abs() < 0.09 * stated, "{mean} {expected}");
         assert!(
             (deviation / stated - 1.0).abs() < 0.064,

@@ -1,4 +1,5 @@
-//! Adversaries for [`super::trajectory`]: fixed extremes, random bang-bang, and one that reads the state.
+//! Adversaries for [`super::trajectory`]: fixed extremes, random bang-bang, and one that reads the
+//! state.
 
 use model::plant::STATES;
 use rand::{Rng, SeedableRng};
@@ -82,8 +83,9 @@ impl Adversary for BangBang {
     }
 }
 
-/// Worst-case search: a linear functional of the state chooses the sign of the power (resonance with the slow
-/// oscillation), the errors push the estimate across cells at random. The parameters can be drawn and mutated.
+/// Worst-case search: a linear functional of the state chooses the sign of the power (resonance
+/// with the slow oscillation), the errors push the estimate across cells at random. The parameters
+/// can be drawn and mutated.
 #[derive(Debug, Clone)]
 pub struct Resonant {
     random: Random,

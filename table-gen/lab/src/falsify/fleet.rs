@@ -16,15 +16,15 @@
 //! goes the same way. So each trajectory is one of a real fleet.
 
 use firmware::table::TableView;
-use model::plant::{GridPlant, STATES};
+use model::plant::{Plant, STATES};
 use model::propagator::Propagator;
 use model::spec::{LossProfile, Spec};
 use model::verdict::{ClaimName, RealPath};
 use rayon::prelude::*;
 
-use super::Falsification;
 use super::adversaries::Random;
 use super::crowd::{Crowd, CrowdTimes, PARTS};
+use super::found::Falsification;
 
 /// Chargers of a crowd, least and most.
 const MEMBERS: (u64, u64) = (8, 200);
@@ -117,7 +117,7 @@ impl Strategy {
 /// Everything that is drawn for a trajectory.
 #[derive(Debug, Clone, PartialEq)]
 struct Draw {
-    plant: GridPlant,
+    plant: Plant,
     initial: [f64; STATES],
     /// Times \[s\] and sizes of the loss from then on \[GW\].
     losses: Vec<(f64, f64)>,
@@ -134,11 +134,11 @@ impl Draw {
             1 => high,
             _ => low + (high - low) * random.unit(),
         };
-        let plant = GridPlant {
+        let plant = Plant {
             inertia: within(spec.inertia_band()),
             governor_gain: within(spec.governor_gain_band()),
             damping: within(spec.damping_band()),
-            ..GridPlant::new(spec)
+            ..Plant::new(spec)
         };
         let initial = &spec.uncertainty.initial;
         let initial = std::array::from_fn(|d| within([initial.lower[d], initial.upper[d]]));

@@ -19,42 +19,31 @@
 //! |---|---|
 //! | constant | a corner of every range, held |
 //! | bang-bang | corners switched at random, at a random pace |
-//! | resonant | the sign of the net power by a linear functional of the state; the best functional so far is mutated |
+//! | resonant | the sign of the net power, by a linear functional of the state |
 //!
-//! The search is deterministic in its seed.
+//! The best functional so far is mutated. The search is deterministic in its seed.
 
 pub mod adversaries;
 pub mod crowd;
 mod fleet;
+mod found;
 pub mod trajectory;
 pub mod witness;
 
 use firmware::table::{TableError, TableView};
 use model::spec::Spec;
-use model::verdict::RealPath;
-use serde::Serialize;
 
 use adversaries::{BangBang, Constant, Random, Resonant};
+pub use found::Falsification;
 use trajectory::{Adversary, Breach, Trajectories};
 use witness::real_path;
 
-/// Length of a trajectory without a horizon \[s\]: several periods of the slow oscillation (28 s for the paper's plant).
+/// Length of a trajectory without a horizon \[s\]: several periods of the slow oscillation (28 s
+/// for the paper's plant).
 const TRAJECTORY_S: f64 = 120.0;
 
-/// What a search found.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Falsification {
-    /// Control steps (ticks) simulated.
-    pub steps: u64,
-    /// Trajectories simulated.
-    pub trajectories: u64,
-    /// Smallest distance from breaking a claim \[Hz\]: f above containment, and inside I2 under Hold; at ticks.
-    pub smallest_margin_hz: f64,
-    /// A trajectory that breaks a claim.
-    pub violation: Option<RealPath>,
-}
-
-/// Searches for a trajectory that breaks a claim, for at least so many control steps or until one is found.
+/// Searches for a trajectory that breaks a claim, for at least so many control steps or until one
+/// is found.
 ///
 /// # Errors
 /// A table that the firmware rejects.

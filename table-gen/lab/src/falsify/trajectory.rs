@@ -1,9 +1,9 @@
 //! One real trajectory of the closed loop: the firmware's control loop against an adversary.
 //!
 //! The plant comes from the spec alone, integrated in plain numbers by its exact step; what is
-//! commanded comes from the firmware alone. Nothing of the verifier is used, so that an error in its
-//! model does not hide itself here. A trajectory that breaks a claim by more than the arithmetic's
-//! error is a real counterexample, whatever the sets say.
+//! commanded comes from the firmware alone. Nothing of the verifier is used, so that an error in
+//! its model does not hide itself here. A trajectory that breaks a claim by more than the
+//! arithmetic's error is a real counterexample, whatever the sets say.
 
 use std::collections::VecDeque;
 
@@ -12,23 +12,23 @@ use firmware::phase::Phase;
 use firmware::prediction::History;
 use firmware::table::{Law, TableView};
 use firmware::units::{AXIS_F, State};
-use model::plant::{GridPlant, STATES};
+use model::plant::{Plant, STATES};
 use model::propagator::Propagator;
 use model::spec::Spec;
 use model::verdict::ClaimName;
 
 /// Pieces of a tick at which the frequency between ticks is looked at.
 const PIECES: usize = 5;
-/// Distance past a limit that counts \[Hz\]: far above the arithmetic's error, far below anything that
-/// matters.
+/// Distance past a limit that counts \[Hz\]: far above the arithmetic's error, far below anything
+/// that matters.
 const MARGIN_HZ: f64 = 1e-6;
 /// Micro-units in a unit.
 const MICRO: f64 = firmware::units::MICRO as f64;
 
 /// What is left to chance and malice.
 pub trait Adversary {
-    /// Initial state as a point of the initial box, each axis in \[0, 1\], and the moment of the event
-    /// within its tick, in \[0, 1\).
+    /// Initial state as a point of the initial box, each axis in \[0, 1\], and the moment of the
+    /// event within its tick, in \[0, 1\).
     fn event(&mut self) -> ([f64; STATES], f64);
     /// For the tick that begins, at a state in Hz and GW: the net power within its interval and the
     /// estimate's error within its bound, both in \[-1, 1\]. The error goes into this tick's
@@ -83,7 +83,7 @@ impl Command {
 pub struct Trajectories<'a> {
     table: &'a TableView<'a>,
     spec: &'a Spec,
-    plant: GridPlant,
+    plant: Plant,
     tick_s: f64,
     /// The plant over 1..=PIECES pieces of a tick.
     pieces: Vec<Propagator>,
@@ -93,7 +93,7 @@ pub struct Trajectories<'a> {
 impl<'a> Trajectories<'a> {
     /// Trajectories of a table on a spec's plant.
     pub fn new(table: &'a TableView<'a>, spec: &'a Spec) -> Self {
-        let plant = GridPlant::new(spec);
+        let plant = Plant::new(spec);
         let tick_s = f64::from(spec.sampling.watch_ms()) / 1000.0;
         let length_s = tick_s / PIECES as f64;
         Self {
@@ -125,8 +125,8 @@ impl<'a> Trajectories<'a> {
         contained.min(f - low).min(high - f)
     }
 
-    /// Runs a trajectory for a number of ticks, or until it breaks a claim; `see` is shown the event
-    /// and every tick.
+    /// Runs a trajectory for a number of ticks, or until it breaks a claim; `see` is shown the
+    /// event and every tick.
     pub fn run(
         &self,
         adversary: &mut dyn Adversary,
@@ -237,8 +237,8 @@ impl<'a> Trajectories<'a> {
         (acting == Phase::Hold && outside).then_some(ClaimName::Stay)
     }
 
-    /// `P u' - w` \[GW\] at a point of its interval: u' within the participation error and at most the
-    /// whole fleet, w within its band; the ends are -1 and 1.
+    /// `P u' - w` \[GW\] at a point of its interval: u' within the participation error and at most
+    /// the whole fleet, w within its band; the ends are -1 and 1.
     fn net_power(&self, command: Command, share: f64) -> f64 {
         let uncertainty = &self.spec.uncertainty;
         let error = uncertainty.participation;

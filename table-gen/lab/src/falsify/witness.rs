@@ -1,4 +1,5 @@
-//! From "not proven" to "refuted": a search for a real trajectory that breaks a claim as the sets suggest.
+//! From "not proven" to "refuted": a search for a real trajectory that breaks a claim as the sets
+//! suggest.
 
 use firmware::table::{TableError, TableView};
 use firmware::units::AXIS_F;
@@ -18,8 +19,8 @@ const TRIES: u64 = 400;
 /// Most control ticks of the whole search.
 const TICKS_MAX: u64 = 3_000_000;
 
-/// Searches a real trajectory for the failures of a verdict. The first that is refuted so becomes the
-/// verdict's counterexample: of several failures, the one with a real trajectory says most.
+/// Searches a real trajectory for the failures of a verdict. The first that is refuted so becomes
+/// the verdict's counterexample: of several failures, the one with a real trajectory says most.
 ///
 /// # Errors
 /// A table that the firmware rejects.

@@ -11,8 +11,8 @@ use rand::{Rng, SeedableRng};
 use rand_pcg::Pcg64;
 use rayon::prelude::*;
 
+use super::config::{FleetConfig, PARTS};
 use super::instance::{Counts, Instance, Tally};
-use super::{FleetConfig, PARTS};
 use crate::simulation::chance::unit;
 use model::spec::Spec;
 

@@ -2,6 +2,9 @@
 
 use model::spec::Spec;
 
+/// Parts of a tick.
+pub(super) const PARTS: usize = 10;
+
 /// The fleet. The cars are the spec's (`[charger]`).
 #[derive(Debug, Clone, PartialEq)]
 pub struct FleetConfig {

@@ -38,7 +38,7 @@ use std::collections::VecDeque;
 use firmware::response::ResponseLaw;
 use firmware::units::{MICRO, Participation};
 
-use super::PARTS;
+use super::config::PARTS;
 
 /// What the proof assumes.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -9,7 +9,7 @@ use firmware::table::TableView;
 use rand::SeedableRng;
 use rand_pcg::Pcg32;
 
-use super::FleetConfig;
+use super::config::{FleetConfig, PARTS};
 use super::hardware::{Dispatcher, Meter, NoWatchdog, Operations};
 use crate::car::{Car, CarConfig, THREE_PHASE_V};
 use crate::simulation::chance::{symmetric, unit};
@@ -96,7 +96,7 @@ impl<'t> Instance<'t> {
     ) -> Self {
         let mut random = Pcg32::seed_from_u64(!config.seed ^ (u64::from(serial) << 32));
         let clock_ppm = spec.charger.clock_ppm * symmetric(&mut random);
-        let parts = super::PARTS as f64;
+        let parts = PARTS as f64;
         let tick_s = f64::from(table.header().tick_ms) / 1000.0;
         let meter = Meter::new(
             config.seed,

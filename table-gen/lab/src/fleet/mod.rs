@@ -1,5 +1,5 @@
-//! A fleet of chargers, each with the whole firmware: its own meter, clock, threshold and faults; the sum of what they
-//! give feeds the plant.
+//! A fleet of chargers, each with the whole firmware: its own meter, clock, threshold and faults;
+//! the sum of what they give feeds the plant.
 //!
 //! | module | holds |
 //! |---|---|
@@ -13,7 +13,8 @@
 //! sees the frequency of that moment; the power of the fleet is constant over a part, and the plant
 //! takes an exact step.
 //!
-//! The power of the fleet is the spec's whatever the number of instances: each stands for `chargers / instances` of them.
+//! The power of the fleet is the spec's whatever the number of instances: each stands for `chargers
+//! / instances` of them.
 
 mod chargers;
 mod config;
@@ -31,17 +32,16 @@ use crate::simulation::monitor::{Knot, Monitor, Summary};
 use crate::simulation::scenario::Scenario;
 use chargers::Chargers;
 pub use config::FleetConfig;
+use config::PARTS;
 use hull::{HullConfig, OutsideHull};
 use instance::{Instance, Tally};
 use measure::{Finish, FleetMeasures, Meters};
-use model::plant::GridPlant;
+use model::plant::Plant;
 use model::propagator::Propagator;
 use model::spec::Spec;
 
-/// Parts of a tick.
-const PARTS: usize = 10;
-/// Time for which the chargers watch the quiet grid before the event \[s\]: the observer's first guess, wrong by at most five
-/// times the meter's error, has decayed by exp(-10 s / T_2) at least.
+/// Time for which the chargers watch the quiet grid before the event \[s\]: the observer's first
+/// guess, wrong by at most five times the meter's error, has decayed by exp(-10 s / T_2) at least.
 const QUIET_S: f64 = 10.0;
 /// Length of a run unless asked otherwise \[s\].
 pub const DURATION_S: f64 = 120.0;
@@ -89,7 +89,7 @@ pub fn run(
     scenario: &Scenario,
     go_on: &dyn Fn() -> bool,
 ) -> Option<FleetRun> {
-    let plant = GridPlant::new(spec);
+    let plant = Plant::new(spec);
     let tick_s = f64::from(table.header().tick_ms) / 1000.0;
     let part_s = tick_s / PARTS as f64;
     let step = Propagator::new(&plant, part_s);

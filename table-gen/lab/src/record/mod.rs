@@ -7,12 +7,13 @@
 //! | `fields` | a line to its fields: separators, quotes, decimal commas |
 //! | `spacing` | rows to samples at one interval: gaps, and what is done about them |
 //!
-//! The text is UTF-8, with or without byte-order mark; lines end in LF or CRLF; lines that are blank
-//! or begin with `#` are skipped, and so is Excel's `sep=;`. Whatever a record does not say plainly
-//! is refused with the line that does not say it. `docs/records.md` is the reader's page.
+//! The text is UTF-8, with or without byte-order mark; lines end in LF or CRLF; lines that are
+//! blank or begin with `#` are skipped, and so is Excel's `sep=;`. Whatever a record does not say
+//! plainly is refused with the line that does not say it. `docs/records.md` is the reader's page.
 
 pub mod columns;
 mod fields;
+mod row;
 mod spacing;
 pub mod time_stamp;
 
@@ -21,31 +22,12 @@ use std::path::{Path, PathBuf};
 use crate::simulation::NOMINAL_HZ;
 use columns::{Choice, Columns};
 use fields::Separator;
+pub use row::{BadRow, RecordSample};
+use row::{Row, SAMPLES_MAX, bad};
 use time_stamp::TimeStamp;
 
 /// Most deviation of a sample from nominal \[Hz\]: what the charger's own gate lets pass as mains.
 pub const RANGE_HZ: f64 = 5.0;
-/// Most samples of a record: a month at ten a second.
-const SAMPLES_MAX: usize = 31 * 86_400 * 10;
-
-/// One sample.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct RecordSample {
-    /// Time since the first sample \[s\].
-    pub time_s: f64,
-    /// Frequency \[Hz\].
-    pub frequency_hz: f64,
-}
-
-/// A row that was left out.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct BadRow {
-    /// Line, from 1.
-    pub line: u64,
-    /// What is wrong, and what is allowed.
-    pub reason: String,
-}
-
 /// A record: at least two samples at one interval, times rising.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Record {
@@ -137,15 +119,6 @@ pub fn read(path: &Path, options: &ReadOptions) -> Result<Record, RecordError> {
     })
 }
 
-/// A row that was understood.
-#[derive(Debug, Clone, Copy, PartialEq)]
-struct Row {
-    line: u64,
-    /// Since the first row \[s\].
-    time_s: f64,
-    frequency_hz: f64,
-}
-
 /// Reads a record from its bytes.
 ///
 /// # Errors
@@ -193,11 +166,6 @@ pub fn parse(bytes: &[u8], options: &ReadOptions) -> Result<Record, BadRow> {
         filled_s: spaced.filled_s,
         skipped: rows.skipped,
     })
-}
-
-fn bad(line: u64, reason: impl Into<String>) -> BadRow {
-    let reason = reason.into();
-    BadRow { line, reason }
 }
 
 /// UTF-8 without its byte-order mark.

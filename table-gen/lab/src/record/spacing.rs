@@ -1,6 +1,6 @@
 //! Rows to samples at one interval.
 
-use super::{BadRow, RecordSample, Row, SAMPLES_MAX, bad};
+use super::row::{BadRow, RecordSample, Row, SAMPLES_MAX, bad};
 
 /// Shortest and longest time between samples \[s\]: the charger's own tick, and the slowest records
 /// that operators publish.

@@ -13,8 +13,8 @@
 
 use jiff::civil::DateTime;
 
-/// Latest number that is read as seconds: the end of the year 2099 since 1970. Larger ones are dates
-/// without marks, or milliseconds.
+/// Latest number that is read as seconds: the end of the year 2099 since 1970. Larger ones are
+/// dates without marks, or milliseconds.
 const SECONDS_MAX: f64 = 4_102_444_800.0;
 
 /// How a file's times are written.

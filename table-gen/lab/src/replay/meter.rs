@@ -17,8 +17,8 @@ use firmware::units::MICRO;
 
 use crate::record::{Record, RecordSample};
 
-/// Steepest change that counts as one of the grid \[Hz/s\]. The worst that the shipped specs know is
-/// 2.2 GW on 102 GVA s (H = 2.04 GW s/Hz): 2.2 / (2 * 2.04) = 0.54 Hz/s. Twice that is 1.08.
+/// Steepest change that counts as one of the grid \[Hz/s\]. The worst that the shipped specs know
+/// is 2.2 GW on 102 GVA s (H = 2.04 GW s/Hz): 2.2 / (2 * 2.04) = 0.54 Hz/s. Twice that is 1.08.
 const STEEPEST_HZ_PER_S: f64 = 1.0;
 /// Records are written to the millihertz \[µHz\].
 const RESOLUTION_UHZ: u32 = 1_000;

@@ -1,8 +1,8 @@
 //! The firmware on a recorded frequency: what would this charger have done?
 //!
-//! The loop is open: the recorded grid does not feel the chargers. The charger is the product's own,
-//! from the gate over the filter to the control loop and the event's end; its meter plays the record
-//! (`meter`). It has been in service for long when the record begins: it has seen the first
+//! The loop is open: the recorded grid does not feel the chargers. The charger is the product's
+//! own, from the gate over the filter to the control loop and the event's end; its meter plays the
+//! record (`meter`). It has been in service for long when the record begins: it has seen the first
 //! sample's frequency for as long as its observer needs to be trusted.
 
 mod meter;
@@ -70,7 +70,8 @@ pub struct Replay {
 }
 
 impl Replay {
-    /// Time from the onset to the first response \[s\]; the onset is known to one step of the record.
+    /// Time from the onset to the first response \[s\]; the onset is known to one step of the
+    /// record.
     pub fn reaction_s(&self) -> Option<f64> {
         Some(self.first_response_s? - self.onset_s?)
     }
@@ -200,8 +201,8 @@ impl Seen {
     }
 }
 
-/// Last sample before the first fall of [`ONSET_FALL_HZ`] within [`ONSET_WITHIN_S`]. A sample that is
-/// off by itself is no event.
+/// Last sample before the first fall of [`ONSET_FALL_HZ`] within [`ONSET_WITHIN_S`]. A sample that
+/// is off by itself is no event.
 fn onset(record: &Record) -> Option<f64> {
     if record.step_s > REACTION_STEP_MAX_S + 1e-3 {
         return None;

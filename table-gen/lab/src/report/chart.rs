@@ -23,8 +23,8 @@ pub struct ChartError {
     reason: String,
 }
 
-/// The figure as a whole SVG document, with title and description for screen readers. It carries no style sheet: see
-/// [`with_style`].
+/// The figure as a whole SVG document, with title and description for screen readers. It carries no
+/// style sheet: see [`with_style`].
 pub fn svg(figure: &Figure) -> Result<String, ChartError> {
     let mut text = String::new();
     {

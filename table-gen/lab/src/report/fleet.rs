@@ -1,4 +1,5 @@
-//! The section of the fleet: what its chargers give together, against what one firmware that knows the state asks for.
+//! The section of the fleet: what its chargers give together, against what one firmware that knows
+//! the state asks for.
 
 use super::figure::{Axis, Curve, Figure, thin};
 use super::palette::Colour;

@@ -1,4 +1,5 @@
-//! The section beyond the paper's plant: the shipped scenarios, and what of them is outside the proof.
+//! The section beyond the paper's plant: the shipped scenarios, and what of them is outside the
+//! proof.
 
 use firmware::table::TableView;
 
@@ -8,13 +9,13 @@ use super::study::{Study, StudyError};
 use crate::simulation::baseline;
 use crate::simulation::beyond::Disturbances;
 use crate::simulation::beyond::file::{ScenarioFile, ScenarioFileError};
-use crate::simulation::beyond::grid::BeyondGrid;
 use crate::simulation::beyond::plant::BeyondPlant;
+use crate::simulation::beyond::system::BeyondSystem;
 use crate::simulation::closed_loop::{ClosedLoop, Estimator, LoopError};
 use crate::simulation::monitor::Summary;
 use crate::simulation::recorder::Recorder;
 use crate::simulation::scenario::Scenario;
-use model::plant::GridPlant;
+use model::plant::Plant;
 use model::spec::Spec;
 
 /// The firmware under disturbances.
@@ -30,18 +31,18 @@ pub fn symbolic_under(
     recorder: &mut impl Recorder,
 ) -> Result<Summary, LoopError> {
     let mut closed_loop = ClosedLoop::new(spec, table, estimator)?;
-    let (grid, seed) = (GridPlant::new(spec), scenario.seed);
+    let (grid, seed) = (Plant::new(spec), scenario.seed);
     let plant = BeyondPlant::new(grid, disturbances, scenario.duration_s + 1.0, seed);
     let (_, parts) = closed_loop.parts(scenario);
-    let mut grid = BeyondGrid::new(plant, parts, scenario.initial);
+    let mut grid = BeyondSystem::new(plant, parts, scenario.initial);
     Ok(closed_loop.run_on(&mut grid, scenario, recorder))
 }
 
 /// Every shipped scenario under the firmware and the baseline.
 ///
 /// # Errors
-/// A table that cannot be run. A shipped scenario that does not go with the spec (too little inertia) is left out, and the
-/// section says so.
+/// A table that cannot be run. A shipped scenario that does not go with the spec (too little
+/// inertia) is left out, and the section says so.
 pub fn beyond(study: &Study) -> Result<Section, StudyError> {
     let (spec, name) = (&study.spec, study.spec.name.as_str());
     let mut section = Section::new(format!("Where the model is wrong: {name}")).say(

@@ -24,6 +24,7 @@ pub mod page;
 pub mod palette;
 pub mod proof;
 pub mod record;
+pub mod rendered;
 pub mod responses;
 pub mod scorecard;
 pub mod section;
@@ -32,51 +33,9 @@ pub mod study;
 use model::budget::Budget;
 use model::spec::Spec;
 use model::verdict::Verdict;
+pub use rendered::{FigureFile, Rendered, ReportError};
 use section::Section;
-use study::{Study, StudyError};
-
-/// Why there is no report.
-#[derive(Debug, thiserror::Error)]
-pub enum ReportError {
-    /// A figure cannot be drawn.
-    #[error(transparent)]
-    Chart(#[from] chart::ChartError),
-    /// A run cannot be made.
-    #[error(transparent)]
-    Study(#[from] StudyError),
-}
-
-/// A figure as files.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct FigureFile {
-    /// Name without ending.
-    pub id: String,
-    /// The drawing, with its own style sheet.
-    pub svg: String,
-    /// What is drawn.
-    pub csv: String,
-}
-
-/// A report.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Rendered {
-    /// The page.
-    pub html: String,
-    /// Its figures in order.
-    pub figures: Vec<FigureFile>,
-}
-
-impl Rendered {
-    /// Every file of the report with its name: the page first, then each figure as SVG and CSV.
-    pub fn files(&self) -> Vec<(String, String)> {
-        let mut files = vec![("report.html".to_owned(), self.html.clone())];
-        for figure in &self.figures {
-            files.push((format!("{}.svg", figure.id), figure.svg.clone()));
-            files.push((format!("{}.csv", figure.id), figure.csv.clone()));
-        }
-        files
-    }
-}
+use study::Study;
 
 /// Results of other commands that the report shows if they are there.
 #[derive(Debug, Clone, Default)]
@@ -90,7 +49,8 @@ pub struct Findings {
 /// Runs of the robustness section unless asked otherwise.
 pub const ROBUSTNESS_RUNS: usize = 1000;
 
-/// The report of a spec and its table, with other specs beside it (such as the other direction of charging).
+/// The report of a spec and its table, with other specs beside it (such as the other direction of
+/// charging).
 ///
 /// `more` are sections that the caller has made, such as a recorded event.
 ///

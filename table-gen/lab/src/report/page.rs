@@ -4,8 +4,8 @@ use maud::{DOCTYPE, Markup, PreEscaped, html};
 
 use super::chart;
 use super::figure::Figure;
+use super::rendered::{FigureFile, Rendered, ReportError};
 use super::section::{DataTable, Section};
-use super::{FigureFile, Rendered, ReportError};
 
 /// The page of these sections, and its figures as files.
 ///

@@ -1,6 +1,7 @@
-//! Colours by what they mean. Each is a distinct colour in the SVG, so that a style sheet can replace it by its value in
-//! the dark (`report.css` selects by attribute); without a style sheet the light values stand. The curves' hues are Okabe
-//! and Ito's, which colour-blind readers can tell apart; curves differ in their dashes too.
+//! Colours by what they mean. Each is a distinct colour in the SVG, so that a style sheet can
+//! replace it by its value in the dark (`report.css` selects by attribute); without a style sheet
+//! the light values stand. The curves' hues are Okabe and Ito's, which colour-blind readers can
+//! tell apart; curves differ in their dashes too.
 
 use plotters::style::RGBColor;
 

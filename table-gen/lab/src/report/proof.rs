@@ -1,6 +1,7 @@
 //! Verdict, budget, spec and hashes.
 
 use model::budget::Budget;
+use model::hex::hex;
 use model::verdict::Verdict;
 use serde::Serialize;
 use sha2::{Digest, Sha256};
@@ -105,7 +106,6 @@ pub fn budget(budget: Option<&Budget>) -> Section {
 pub fn origin(study: &Study) -> Section {
     let mut section = Section::new(format!("Origin: {}", study.spec.name));
     let mut table = DataTable::new("What this report was made from", &["What", "Value"]);
-    let hex = |bytes: &[u8]| bytes.iter().map(|b| format!("{b:02x}")).collect::<String>();
     table.row(["spec hash".to_owned(), hex(&study.spec.hash())]);
     table.row(["table".to_owned(), format!("{} bytes", study.table.len())]);
     table.row([

@@ -1,4 +1,5 @@
-//! The sections of a recorded event: what the firmware would have done, and what would have become of the frequency.
+//! The sections of a recorded event: what the firmware would have done, and what would have become
+//! of the frequency.
 
 use super::figure::{Axis, Curve, Figure, Stretch, thin};
 use super::palette::Colour;

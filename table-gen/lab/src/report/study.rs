@@ -82,7 +82,8 @@ impl Study {
     }
 }
 
-/// The event on a spec's plant with the paper's fleets and the baseline droop: none, unidirectional, bidirectional.
+/// The event on a spec's plant with the paper's fleets and the baseline droop: none,
+/// unidirectional, bidirectional.
 #[derive(Debug, Clone)]
 pub struct BaselineEvent {
     /// No response.

@@ -1,13 +1,15 @@
-//! The plant with the baseline droop, in continuous time (the paper's Fig. 2, with R_ev in Hz and D the plant's):
+//! The plant with the baseline droop, in continuous time (the paper's Fig. 2, with R_ev in Hz and D
+//! the plant's):
 //!
 //! ```text
 //! e = max(-f - deadband, 0) / R_ev        T_ev q' = e - D q        u = clamp(q, 0, 1)        EV power P u
 //! ```
 //!
-//! Five states, with kinks at the dead band and at saturation, by the classical Runge-Kutta method. At 1 ms the local
-//! error away from the kinks is about (h / T_ev)⁵ / 120 = 2e-10, and at a kink h² times the change of slope, 1e-6 times
-//! a slope in q of at most 1/s: below the printed digits. With a delay the power follows u by a whole number of steps, held over each: it
-//! is late by half a step more or less.
+//! Five states, with kinks at the dead band and at saturation, by the classical Runge-Kutta method.
+//! At 1 ms the local error away from the kinks is about (h / T_ev)⁵ / 120 = 2e-10, and at a kink h²
+//! times the change of slope, 1e-6 times a slope in q of at most 1/s: below the printed digits.
+//! With a delay the power follows u by a whole number of steps, held over each: it is late by half
+//! a step more or less.
 
 use std::collections::VecDeque;
 
@@ -16,7 +18,7 @@ use super::beyond::plant::{BeyondPlant, runge_kutta};
 use super::monitor::{Knot, Monitor};
 use super::scenario::Scenario;
 use super::trajectory::{Run, Sample};
-use model::plant::{GridPlant, STATES};
+use model::plant::{Plant, STATES};
 use model::spec::Spec;
 
 /// Step of the integration \[s\].
@@ -30,14 +32,15 @@ pub fn simulate(spec: &Spec, scenario: &Scenario, respond: bool) -> Run {
     simulate_under(spec, &disturbances, scenario, respond)
 }
 
-/// The same under any disturbances, which replace the scenario's loss. Losses come at whole milliseconds: on a step's end.
+/// The same under any disturbances, which replace the scenario's loss. Losses come at whole
+/// milliseconds: on a step's end.
 pub fn simulate_under(
     spec: &Spec,
     disturbances: &Disturbances,
     scenario: &Scenario,
     respond: bool,
 ) -> Run {
-    let grid = GridPlant::new(spec);
+    let grid = Plant::new(spec);
     let plant = BeyondPlant::new(grid, disturbances, scenario.duration_s, scenario.seed);
     let baseline = &spec.baseline;
     let lag = baseline.time_s;

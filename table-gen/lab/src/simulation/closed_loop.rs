@@ -1,9 +1,9 @@
 //! The firmware's own control loop against a grid, from the bytes of a table.
 //!
-//! Time goes in ticks of the table. At each tick the state is measured (with this run's measurement error, floored to
-//! micro-units, as the device stores it), the firmware answers, and the grid moves to the next tick. With an actuation
-//! delay the command acts later; a delay that is no whole number of ticks splits each tick in two. The first tick comes
-//! `event_offset_s` after the event.
+//! Time goes in ticks of the table. At each tick the state is measured (with this run's measurement
+//! error, floored to micro-units, as the device stores it), the firmware answers, and the grid
+//! moves to the next tick. With an actuation delay the command acts later; a delay that is no whole
+//! number of ticks splits each tick in two. The first tick comes `event_offset_s` after the event.
 
 use firmware::control_loop::{Action, ControlLoop};
 use firmware::observer::{Observer, ObserverConfig, ObserverError};
@@ -12,12 +12,12 @@ use firmware::table::TableView;
 use firmware::units::{MICRO, State};
 
 use super::chance::Chance;
-use super::grid::{Grid, LinearGrid, Part, PartLengths};
 use super::monitor::{Monitor, Summary};
+use super::power_system::{LinearSystem, Part, PartLengths, PowerSystem};
 use super::recorder::{History, Recorder};
 use super::scenario::Scenario;
 use super::trajectory::{Run, Sample};
-use model::plant::{GridPlant, STATES};
+use model::plant::{Plant, STATES};
 use model::propagator::Propagator;
 use model::spec::Spec;
 
@@ -51,7 +51,7 @@ pub fn measured(x: &[f64; STATES]) -> State {
 /// Firmware, grid parameters and buffers; made once and run as often as wanted without allocating.
 #[derive(Debug, Clone)]
 pub struct ClosedLoop<'t> {
-    plant: GridPlant,
+    plant: Plant,
     tick_s: f64,
     tick_step: Propagator,
     monitor: Monitor,
@@ -73,7 +73,7 @@ impl<'t> ClosedLoop<'t> {
         estimator: Estimator,
     ) -> Result<Self, LoopError> {
         let header = table.header();
-        let plant = GridPlant::new(spec);
+        let plant = Plant::new(spec);
         let tick_s = f64::from(header.tick_ms) / 1000.0;
         let observer = match estimator {
             Estimator::FullState => None,
@@ -108,14 +108,14 @@ impl<'t> ClosedLoop<'t> {
     pub fn run(&mut self, scenario: &Scenario, recorder: &mut impl Recorder) -> Summary {
         let (_, parts) = self.parts(scenario);
         let (loss, initial) = (scenario.loss_gw, scenario.initial);
-        let mut grid = LinearGrid::new(self.plant, &self.tick_step, parts, loss, initial);
+        let mut grid = LinearSystem::new(self.plant, &self.tick_step, parts, loss, initial);
         self.run_on(&mut grid, scenario, recorder)
     }
 
     /// One run on any grid. `scenario.loss_gw` and `scenario.initial` are the grid's own matter.
     pub fn run_on(
         &mut self,
-        grid: &mut impl Grid,
+        grid: &mut impl PowerSystem,
         scenario: &Scenario,
         recorder: &mut impl Recorder,
     ) -> Summary {
@@ -172,7 +172,8 @@ impl<'t> ClosedLoop<'t> {
         monitor.summary()
     }
 
-    /// Sends a command on its way; returns what acts before and after the part of a tick that the delay leaves over.
+    /// Sends a command on its way; returns what acts before and after the part of a tick that the
+    /// delay leaves over.
     #[inline]
     fn send(&mut self, command: f64) -> (f64, f64) {
         let older = std::mem::replace(&mut self.pending[self.at], command);

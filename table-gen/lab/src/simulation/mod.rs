@@ -1,10 +1,11 @@
-//! The grid in time: the plant's exact steps, the controllers that drive it, and what is measured on the way.
+//! The grid in time: the plant's exact steps, the controllers that drive it, and what is measured
+//! on the way.
 //!
 //! | module | holds |
 //! |---|---|
 //! | [`scenario`] | what happens to the grid in a run |
 //! | [`chance`] | what is drawn at each tick |
-//! | [`mod@model::propagator`], [`grid`] | the exact discrete step of the linear plant |
+//! | [`mod@model::propagator`], [`power_system`] | the exact discrete step of the linear plant |
 //! | [`beyond`] | a plant that is wrong in other ways: not linear, simulation only |
 //! | [`baseline`] | the continuous loop with the baseline droop, which is not linear |
 //! | [`closed_loop`] | the firmware's own loop on the emitted bytes |
@@ -16,9 +17,9 @@ pub mod baseline;
 pub mod beyond;
 pub mod chance;
 pub mod closed_loop;
-pub mod grid;
 pub mod monitor;
 pub mod monte_carlo;
+pub mod power_system;
 pub mod recorder;
 pub mod scenario;
 pub mod trajectory;

@@ -41,7 +41,8 @@ pub struct ScenarioError {
 }
 
 impl Scenario {
-    /// The event of a spec: the middle of its loss band, from the middle of its initial box, no error.
+    /// The event of a spec: the middle of its loss band, from the middle of its initial box, no
+    /// error.
     pub fn of(spec: &Spec) -> Self {
         let [low, high] = spec.uncertainty.loss_gw;
         let initial = &spec.uncertainty.initial;

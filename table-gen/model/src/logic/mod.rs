@@ -8,19 +8,17 @@
 //! |---|---|
 //! | text to formula | [`mod@parse`] |
 //! | formula to text, so that parsing gives the same formula again | [`formula`] |
-//! | formula to the games of a spec, or the sub-formula that no game plays | [`mod@compile`] |
 //!
 //! # The language
-//! `f` is the deviation from 50 Hz \[Hz\], `loss` the lost infeed \[GW\]. Atoms compare a signal with a number (`<=`,
-//! `>=`, `<`, `>`) or ask for membership in a closed interval, written out (`f in [-0.3, 0]`) or by name (`f in I1`).
-//! Operators, from the one that binds least: `->` (to the right), `|`, `&`, `U`, then the prefixes `!`, `G`, `F`. The
-//! temporal ones take a bound, as in `F[<=60s]`. Words and symbols of the literature are understood on input:
-//! `always`, `eventually`, `not`, `and`, `or`, `implies`, `until`.
+//! `f` is the deviation from 50 Hz \[Hz\], `loss` the lost infeed \[GW\]. Atoms compare a signal
+//! with a number (`<=`, `>=`, `<`, `>`) or ask for membership in a closed interval, written out (`f
+//! in [-0.3, 0]`) or by name (`f in I1`). Operators, from the one that binds least: `->` (to the
+//! right), `|`, `&`, `U`, then the prefixes `!`, `G`, `F`. The temporal ones take a bound, as in
+//! `F[<=60s]`. Words and symbols of the literature are understood on input: `always`, `eventually`,
+//! `not`, `and`, `or`, `implies`, `until`.
 
-pub mod compile;
 pub mod formula;
 pub mod parse;
 
-pub use compile::{Compiled, NotSupported, compile};
 pub use formula::{Comparison, Formula, Interval, Signal};
 pub use parse::{ParseError, parse};

@@ -1,4 +1,5 @@
-//! What a key may hold: the vocabulary of ranges shared by the checks, the error texts and the reference.
+//! What a key may hold: the vocabulary of ranges shared by the checks, the error texts and the
+//! reference.
 
 use std::fmt;
 
@@ -112,7 +113,8 @@ pub enum Allowed {
 }
 
 impl Allowed {
-    /// Whether the key may be absent with a meaning of its own, rather than standing for its default.
+    /// Whether the key may be absent with a meaning of its own, rather than standing for its
+    /// default.
     #[must_use]
     pub fn is_optional(&self) -> bool {
         matches!(

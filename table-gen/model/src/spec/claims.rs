@@ -32,7 +32,8 @@ impl LossProfile {
     }
 }
 
-/// Bounds on what is not known exactly. Every bound holds at all times, for an adversary that may vary it.
+/// Bounds on what is not known exactly. Every bound holds at all times, for an adversary that may
+/// vary it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct UncertaintySpec {
@@ -44,7 +45,8 @@ pub struct UncertaintySpec {
     ///
     /// Unit: -. Allowed: "band" or "constant" or "non-decreasing". Default: "band".
     pub loss_profile: LossProfile,
-    /// Relative error of participation: the fleet delivers u (1 +- this), at most 1. The paper simulates 0.1.
+    /// Relative error of participation: the fleet delivers u (1 +- this), at most 1. The paper
+    /// simulates 0.1.
     ///
     /// Unit: 1. Allowed: a number from 0 to below 1. Default: 0.
     pub participation: f64,
@@ -120,24 +122,25 @@ pub struct InitialBox {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct RequirementsSpec {
-    /// The requirements as one formula of temporal logic ([`crate::logic`]); it gives the keys below that it speaks of, and any
-    /// that is given as well must agree. Absent: the keys alone.
+    /// The requirements as one formula of temporal logic ([`crate::logic`]); it gives the keys
+    /// below that it speaks of, and any that is given as well must agree. Absent: the keys alone.
     ///
     /// Unit: -. Allowed: a formula in the supported fragment, or none. Default: none.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub formula: Option<String>,
-    /// f stays at or above this, always; absent: no such claim. The paper's psi_1 has -0.8. Below `outer_hz`.
+    /// f stays at or above this, always; absent: no such claim. The paper's psi_1 has -0.8. Below
+    /// `outer_hz`.
     ///
     /// Unit: Hz. Allowed: a number from -10 to 0, or none. Default: none.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub containment_hz: Option<f64>,
-    /// The larger target I1 = [low, high]: C1 brings f back into it. Whole µHz, inside the grid. The paper's
-    /// "Simulations with a Multi-phase Controller".
+    /// The larger target I1 = [low, high]: C1 brings f back into it. Whole µHz, inside the grid.
+    /// The paper's "Simulations with a Multi-phase Controller".
     ///
     /// Unit: Hz. Allowed: 2 numbers, each from -10 to 10. Default: [-0.3, 0].
     pub outer_hz: [f64; 2],
-    /// The smaller target I2 = [low, high]: C2 brings f into it. Whole µHz, inside I1, which it may equal. The paper's
-    /// "Simulations with a Multi-phase Controller".
+    /// The smaller target I2 = [low, high]: C2 brings f into it. Whole µHz, inside I1, which it may
+    /// equal. The paper's "Simulations with a Multi-phase Controller".
     ///
     /// Unit: Hz. Allowed: 2 numbers, each from -10 to 10. Default: [-0.15, 0].
     pub inner_hz: [f64; 2],

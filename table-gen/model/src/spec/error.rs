@@ -1,4 +1,5 @@
-//! What can be wrong with a spec. Every message says where, which key, what was found and what is allowed.
+//! What can be wrong with a spec. Every message says where, which key, what was found and what is
+//! allowed.
 
 use std::io;
 
@@ -184,7 +185,8 @@ pub enum SpecError {
         /// What the machine has.
         available_bytes: u64,
     },
-    /// The checked document does not deserialise: the key table and the structs disagree, which tests exclude.
+    /// The checked document does not deserialise: the key table and the structs disagree, which
+    /// tests exclude.
     #[error("{origin}: {message}")]
     Malformed {
         /// Where the text comes from.
@@ -208,7 +210,7 @@ impl SpecError {
             | Self::Inconsistent { key, .. }
             | Self::EmptyTarget { key, .. }
             | Self::TooManyCells { key, .. } => Some(key),
-            Self::Formula { .. } => Some(super::formula::KEY),
+            Self::Formula { .. } => Some(super::keys::FORMULA),
             Self::UnknownSpec { .. }
             | Self::Unreadable { .. }
             | Self::TooLong { .. }

@@ -1,25 +1,28 @@
 //! `requirements.formula`: requirements written as one formula of temporal logic.
 //!
-//! A formula is compiled into the keys that say the same ([`mod@crate::logic::compile`]), which is what synthesis and the verifier
-//! read. A key that is given beside the formula must agree with it; what the formula does not speak of keeps its key's value or
-//! default; a formula with one band alone means it as both. The names `I1` and `I2` in it are `requirements.outer_hz` and `requirements.inner_hz`. The spec keeps the formula as
-//! it is printed, whatever spaces and words it was written with.
+//! A formula is compiled into the keys that say the same ([`super::compile`]), which is what
+//! synthesis and the verifier read. A key that is given beside the formula must agree with it; what
+//! the formula does not speak of keeps its key's value or default; a formula with one band alone
+//! means it as both. The names `I1` and `I2` in it are `requirements.outer_hz` and
+//! `requirements.inner_hz`. The spec keeps the formula as it is printed, whatever spaces and words
+//! it was written with.
 
 use toml::{Table, Value};
 
-use super::overrides::Origin;
+use super::compile::{Compiled, compile};
+use super::keys::FORMULA as KEY;
+use super::origin::Origin;
 use super::{Spec, SpecError, keys};
-use crate::logic::{self, Compiled};
+use crate::logic;
 
-/// The key.
-pub(super) const KEY: &str = "requirements.formula";
 const LOSS: &str = "uncertainty.loss_gw";
 
-/// Puts what the formula of a checked document says in the place of the keys, if there is a formula.
+/// Puts what the formula of a checked document says in the place of the keys, if there is a
+/// formula.
 ///
 /// # Errors
-/// No formula of the language or of the supported fragment, a key beside it that says something else, or a bound of the
-/// loss on one side alone.
+/// No formula of the language or of the supported fragment, a key beside it that says something
+/// else, or a bound of the loss on one side alone.
 pub(super) fn expand(document: &mut Table, origin: &Origin) -> Result<(), SpecError> {
     let Some(Value::String(text)) = lookup(document, KEY) else {
         return Ok(());
@@ -89,7 +92,7 @@ fn compiled(text: &str, spec: &Spec, origin: &Origin) -> Result<(String, Compile
         reason,
     };
     let formula = logic::parse(text).map_err(|error| refused(error.to_string()))?;
-    let compiled = logic::compile(&formula, spec).map_err(|error| refused(error.to_string()))?;
+    let compiled = compile(&formula, spec).map_err(|error| refused(error.to_string()))?;
     Ok((formula.to_string(), compiled))
 }
 

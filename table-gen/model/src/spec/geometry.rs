@@ -1,14 +1,14 @@
 //! Relations on the state space: the grid as the device counts it, and what must lie inside it.
 
 use super::grid::{STATE_NAMES, from_micro, to_micro, to_whole_micro};
-use super::overrides::Origin;
-use super::validate::inconsistent;
+use super::origin::{Origin, inconsistent};
 use super::{Alignment, GridSpec, Spec, SpecError, memory};
 
 /// The device counts cells along an axis in 16 bits.
 const CELLS_PER_AXIS_MAX: u32 = u16::MAX as u32;
 
-/// Checks that every cell edge is exact in micro-units, and that the counts fit the device and this machine.
+/// Checks that every cell edge is exact in micro-units, and that the counts fit the device and this
+/// machine.
 pub(super) fn check_grid(grid: &GridSpec, origin: &Origin) -> Result<(), SpecError> {
     for axis in 0..4 {
         check_order(grid, axis, origin)?;
@@ -158,7 +158,8 @@ pub(super) fn check_initial(spec: &Spec, origin: &Origin) -> Result<(), SpecErro
     Ok(())
 }
 
-/// Checks that each target lies inside the grid, is exact in µHz, and contains a whole cell of the f axis.
+/// Checks that each target lies inside the grid, is exact in µHz, and contains a whole cell of the
+/// f axis.
 pub(super) fn check_targets(spec: &Spec, origin: &Origin) -> Result<(), SpecError> {
     let requirements = &spec.requirements;
     check_target(
@@ -199,7 +200,8 @@ fn check_target(
         return Err(inconsistent(origin, key, interval(), allowed));
     }
     let width = i64::from(grid.widths_micro()[0]);
-    // The first cell that begins inside: as low >= first_edge, rounding up is (n + width - 1) / width.
+    // The first cell that begins inside: as low >= first_edge, rounding up is (n + width - 1) /
+    // width.
     let cells_before = (low - first_edge + width - 1) / width;
     if first_edge + (cells_before + 1) * width > high {
         return Err(SpecError::EmptyTarget {

@@ -1,12 +1,14 @@
 //! The cells of the state space: the spec's section, and its exact integer form.
 //!
 //! # Design
-//! The device computes in micro-units (1e-6 of a state's unit: µHz and kW) held in `i32`. Every cell edge is a whole
-//! number of them (`geometry` refuses a grid where it is not), so host and device agree on each cell to the last bit,
-//! and everything here is integer arithmetic after one rounding per number.
+//! The device computes in micro-units (1e-6 of a state's unit: µHz and kW) held in `i32`. Every
+//! cell edge is a whole number of them (`geometry` refuses a grid where it is not), so host and
+//! device agree on each cell to the last bit, and everything here is integer arithmetic after one
+//! rounding per number.
 //!
 //! # Tradeoffs
-//! The functions are total: on a grid that was never validated they saturate rather than panic, and mean nothing.
+//! The functions are total: on a grid that was never validated they saturate rather than panic, and
+//! mean nothing.
 
 use serde::{Deserialize, Serialize};
 
@@ -20,7 +22,8 @@ pub(super) const STATE_NAMES: [&str; 4] = ["f", "g", "l", "p"];
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Alignment {
-    /// Cell centres at multiples of the width, as SCOTS has it; `lower` and `upper` are the outermost centres.
+    /// Cell centres at multiples of the width, as SCOTS has it; `lower` and `upper` are the
+    /// outermost centres.
     Centres,
     /// Cells side by side from `lower` to `upper`, which are the outermost edges.
     Edges,
@@ -42,9 +45,9 @@ impl Alignment {
 
 /// The uniform grid over the states (f, g, l, p), in Hz and GW; f is the deviation from 50 Hz.
 ///
-/// Further conditions: `lower < upper`; `upper - lower` a whole number of widths; `lower` and `width` whole multiples
-/// of 1e-6; with centres, `width` an even multiple and `lower` a multiple of `width`; 1 to 65535 cells along each axis;
-/// all cells together within the memory at hand.
+/// Further conditions: `lower < upper`; `upper - lower` a whole number of widths; `lower` and
+/// `width` whole multiples of 1e-6; with centres, `width` an even multiple and `lower` a multiple
+/// of `width`; 1 to 65535 cells along each axis; all cells together within the memory at hand.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct GridSpec {
@@ -58,7 +61,8 @@ pub struct GridSpec {
     pub upper: [f64; 4],
     /// Width of a cell. The paper's "Symbolic Control for the Grid".
     ///
-    /// Unit: Hz, GW, GW, GW. Allowed: 4 numbers, each from 0.000001 to 100. Default: [0.05, 0.05, 0.05, 0.05].
+    /// Unit: Hz, GW, GW, GW. Allowed: 4 numbers, each from 0.000001 to 100. Default: [0.05, 0.05,
+    /// 0.05, 0.05].
     pub width: [f64; 4],
     /// Whether `lower` and `upper` are cell centres or cell edges.
     ///
@@ -144,8 +148,8 @@ pub(super) fn from_micro(micro: i64) -> f64 {
 
 /// `value` in micro-units where it is a whole number of them.
 ///
-/// The tolerance covers the noise of one decimal conversion, one sum and one product at the ends of the allowed range:
-/// 2000 units are 2e9 micro-units, where each rounding errs by at most 2.4e-7.
+/// The tolerance covers the noise of one decimal conversion, one sum and one product at the ends of
+/// the allowed range: 2000 units are 2e9 micro-units, where each rounding errs by at most 2.4e-7.
 pub(super) fn to_whole_micro(value: f64) -> Option<i64> {
     const TOLERANCE_MICRO: f64 = 1e-6;
     let scaled = value * MICRO_PER_UNIT;

@@ -1,8 +1,9 @@
 //! The spec's hash: which spec a table was made for.
 //!
 //! # Design
-//! SHA-256 over a canonical text, cut to 16 bytes. The text begins with the line `holdfast-spec-1`; then every key of
-//! the table in `keys`, in that order, defaults included, gives one line `path=value` ending in `\n`, with the value
+//! SHA-256 over a canonical text, cut to 16 bytes. The text begins with the line `holdfast-spec-1`;
+//! then every key of the table in `keys`, in that order, defaults included, gives one line
+//! `path=value` ending in `\n`, with the value
 //!
 //! | kind | written as |
 //! |---|---|
@@ -14,23 +15,24 @@
 //! | formula | as it is printed, so that spaces and the choice of words do not matter; without one there is no such line |
 //! | absent | `none` |
 //!
-//! Nothing in it depends on the platform, on the order of keys in the file or on how a number was written there. A new
-//! key changes every hash (but one of `[charger]`, which is the laboratory's alone and stands in no hash): a table must then be built and verified again, which is intended.
+//! Nothing in it depends on the platform, on the order of keys in the file or on how a number was
+//! written there. A new key changes every hash: a table must then be built and verified again,
+//! which is intended. The keys of `[charger]` are the laboratory's alone and stand in no hash.
 
 use std::fmt::Write as _;
 
 use sha2::{Digest, Sha256};
 
-use super::keys::{KEYS, KeyValue};
-use super::{Spec, formula};
+use super::Spec;
+use super::keys::{FORMULA, KEYS, KeyValue};
 
 /// Section that no table depends on.
 const LABORATORY: &str = "charger";
 const HEADING: &str = "holdfast-spec-1\n";
 
 impl Spec {
-    /// The first 16 bytes of SHA-256 over the canonical text of the resolved spec (all keys with their defaults): the
-    /// same on every platform, and different for specs that differ in any key.
+    /// The first 16 bytes of SHA-256 over the canonical text of the resolved spec (all keys with
+    /// their defaults): the same on every platform, and different for specs that differ in any key.
     #[must_use]
     pub fn hash(&self) -> [u8; 16] {
         let digest = Sha256::digest(self.canonical_text().as_bytes());
@@ -41,7 +43,7 @@ impl Spec {
         let mut text = HEADING.to_owned();
         for key in KEYS {
             let value = (key.get)(self);
-            if key.path == formula::KEY && value == KeyValue::Absent {
+            if key.path == FORMULA && value == KeyValue::Absent {
                 continue;
             }
             if key.section() == LABORATORY {
@@ -85,7 +87,8 @@ fn push_number(text: &mut String, x: f64) {
 mod tests {
     use super::*;
 
-    /// Computed outside this program, with Python's tomllib, struct and hashlib from the description above.
+    /// Computed outside this program, with Python's tomllib, struct and hashlib from the
+    /// description above.
     const PAPER_BI: &str = "c18c51cde84a6837d0f04e7d3e61b73f";
 
     fn hex(bytes: &[u8]) -> String {

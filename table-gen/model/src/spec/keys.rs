@@ -2,16 +2,17 @@
 
 use std::fmt;
 
-use super::DelayRange;
+use super::Spec;
 use super::allowed::{Allowed, Range};
 use super::claims::{Domain, LossProfile};
+use super::delay_range::DelayRange;
 use super::grid::{Alignment, MICRO_PER_UNIT};
 use super::meter::MeterKind;
 use super::plant::Direction;
 use super::sampling::Successor;
-use super::{Spec, formula};
 
-/// One key of the spec, for a listing: `table-gen keys` prints these as the reference of the spec file.
+/// One key of the spec, for a listing: `table-gen keys` prints these as the reference of the spec
+/// file.
 #[derive(Debug, Clone, PartialEq)]
 pub struct KeyDoc {
     /// Dotted path, such as `plant.damping_gw_per_hz`.
@@ -198,8 +199,12 @@ const _: () = assert!(WATCH_MAX_S * 1e3 == firmware::table::TICK_MS_MAX as f64);
 
 const STATE_MAX: f64 = 2000.0;
 const WIDTH_MAX: f64 = 100.0;
-// The outermost edge, half a cell past the end of the working region, is an i32 in micro-units on the device.
+// The outermost edge, half a cell past the end of the working region, is an i32 in micro-units on
+// the device.
 const _: () = assert!((STATE_MAX + WIDTH_MAX / 2.0) * MICRO_PER_UNIT <= i32::MAX as f64);
+
+/// The key of the formula, which gives others.
+pub(super) const FORMULA: &str = "requirements.formula";
 
 /// Every key, in the order of the spec file. The hash depends on this order and on the paths.
 #[rustfmt::skip] // One key to a group of lines, as a table.
@@ -333,7 +338,7 @@ pub(super) const KEYS: &[Key] = &[
     row("uncertainty.initial.upper", STATE_UNIT, STATE,
         "upper corner of the states at the event (f, g, l, p)", |s| KeyValue::Numbers(&s.uncertainty.initial.upper)),
 
-    row(formula::KEY, "-", Allowed::OptionalFormula,
+    row(FORMULA, "-", Allowed::OptionalFormula,
         "the requirements as temporal logic; gives the keys it speaks of", |s| s.requirements.formula.as_deref().map_or(KeyValue::Absent, KeyValue::Text)),
     row("requirements.containment_hz", "Hz", Allowed::OptionalNumber(Range::closed(-10.0, 0.0)),
         "f never falls below this; absent: no such claim", |s| optional(s.requirements.containment_hz)),

@@ -5,15 +5,16 @@ use std::io::{self, Read};
 
 use toml::Table;
 
-use super::overrides::{Origin, Override};
+use super::origin::Origin;
+use super::overrides::Override;
 use super::{Spec, SpecError, formula, resolve, shipped};
 
 /// Longest file that is read: a hundred times the longest shipped spec.
 const FILE_LEN_MAX: u64 = 1 << 20;
 
 impl Spec {
-    /// Loads a spec: the shipped one named `arg`, or the file at the path `arg` (`./paper-bi` for a file with a shipped
-    /// spec's name), with `overrides` of the form `KEY=VALUE` applied in order.
+    /// Loads a spec: the shipped one named `arg`, or the file at the path `arg` (`./paper-bi` for a
+    /// file with a shipped spec's name), with `overrides` of the form `KEY=VALUE` applied in order.
     ///
     /// # Errors
     /// Everything in [`SpecError`].
@@ -30,7 +31,8 @@ impl Spec {
         shipped::NAMES
     }
 
-    /// Reads a spec from TOML text; `origin` is what error messages call the text, usually its path.
+    /// Reads a spec from TOML text; `origin` is what error messages call the text, usually its
+    /// path.
     ///
     /// # Errors
     /// Everything in [`SpecError`] except that the text cannot be found or read.
@@ -47,10 +49,16 @@ impl Spec {
         for item in &overrides {
             item.apply(&mut document);
             // Each in turn: the next may reach into a section that this one replaced.
-            resolve::check(&document, &file.with_overrides(&overrides))?;
+            resolve::check(
+                &document,
+                &file.with_overrides(overrides.iter().map(Override::named)),
+            )?;
         }
 
-        formula::expand(&mut document, &file.with_overrides(&overrides))?;
+        formula::expand(
+            &mut document,
+            &file.with_overrides(overrides.iter().map(Override::named)),
+        )?;
         let spec: Self =
             document
                 .try_into()
@@ -58,7 +66,7 @@ impl Spec {
                     origin: origin.to_owned(),
                     message: error.message().to_owned(),
                 })?;
-        spec.validate_from(&file.with_overrides(&overrides))?;
+        spec.validate_from(&file.with_overrides(overrides.iter().map(Override::named)))?;
         Ok(spec)
     }
 }

@@ -2,8 +2,9 @@
 
 use std::fs;
 
-/// What synthesis holds for each cell: mask (4 bytes) and rank (2) of up to three laws, and up to 6 bytes of eroded sets (a
-/// bit each) and of cells that a sweep won. Two laws take 18 to 19 bytes a cell on grids of 11 to 90 million cells.
+/// What synthesis holds for each cell: mask (4 bytes) and rank (2) of up to three laws, and up to 6
+/// bytes of eroded sets (a bit each) and of cells that a sweep won. Two laws take 18 to 19 bytes a
+/// cell on grids of 11 to 90 million cells.
 const BYTES_PER_CELL: u64 = 24;
 
 /// What synthesis needs on any grid: the program, its buffers and its output.
@@ -19,7 +20,8 @@ pub(super) fn needed_bytes(cells: u64) -> u64 {
         .saturating_add(BYTES_FIXED)
 }
 
-/// Memory in bytes that a new program may use: `MemAvailable` of `/proc/meminfo`, or 4 GiB where there is none.
+/// Memory in bytes that a new program may use: `MemAvailable` of `/proc/meminfo`, or 4 GiB where
+/// there is none.
 pub(super) fn available_bytes() -> u64 {
     fs::read_to_string("/proc/meminfo")
         .ok()

@@ -6,23 +6,25 @@
 //! |---|---|---|
 //! | a shipped name or a path becomes text | `shipped`, `load` | unknown name, unreadable file |
 //! | text becomes a table of keys | `load` | syntax, with line and column |
-//! | names and types are checked against the key table | `keys`, `resolve` | unknown key, wrong type |
+//! | names and types are checked | `keys`, `resolve` | unknown key, wrong type |
 //! | `--set KEY=VALUE` replaces single keys | `overrides` | the same, named as an override |
 //! | a formula becomes the keys that say the same | `formula` | syntax, outside the fragment, a key that disagrees |
 //! | missing keys take their defaults | `plant`, `grid`, `sampling`, `claims` | |
 //! | ranges, then relations between keys | `validate`, `geometry`, `memory` | a value or a combination that cannot be |
 //!
-//! What comes out is a [`Spec`]: plain numbers in the units that the key names carry. [`Spec::hash`] names it in
-//! the table's header, so that a table can be told from one made for another spec.
+//! What comes out is a [`Spec`]: plain numbers in the units that the key names carry.
+//! [`Spec::hash`] names it in the table's header, so that a table can be told from one made for
+//! another spec.
 //!
 //! # Design
-//! One table of keys (`keys`) holds unit, range and description. The range check, the error texts, the listing
-//! for people ([`reference()`]) and the hash all walk that table, so they cannot disagree; a test compares it with
-//! the structs and with their documentation.
+//! One table of keys (`keys`) holds unit, range and description. The range check, the error texts,
+//! the listing for people ([`reference()`]) and the hash all walk that table, so they cannot
+//! disagree; a test compares it with the structs and with their documentation.
 
 mod allowed;
 mod charger;
 mod claims;
+mod compile;
 mod delay_range;
 mod error;
 mod formula;
@@ -33,6 +35,7 @@ mod keys;
 mod load;
 mod memory;
 mod meter;
+mod origin;
 mod overrides;
 mod plant;
 mod preference;
@@ -48,6 +51,7 @@ mod validate;
 pub use allowed::{Allowed, Range};
 pub use charger::ChargerSpec;
 pub use claims::{Domain, InitialBox, LossProfile, RequirementsSpec, TableSpec, UncertaintySpec};
+pub use compile::{Compiled, NotSupported, compile};
 pub use delay_range::DelayRange;
 pub use error::SpecError;
 pub use grid::{Alignment, GridSpec};

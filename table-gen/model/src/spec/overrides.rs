@@ -21,52 +21,17 @@ pub(super) struct Override {
     text: String,
 }
 
-/// Where values come from, so that an error names the `--set` that caused it rather than the file.
-#[derive(Debug, Clone, Default)]
-pub(super) struct Origin {
-    file: String,
-    overrides: Vec<(String, String)>,
-}
-
-impl Origin {
-    /// Values that all come from one file.
-    pub(super) fn file(name: &str) -> Self {
-        Self {
-            file: name.to_owned(),
-            overrides: Vec::new(),
-        }
-    }
-
-    /// The same file under overrides.
-    pub(super) fn with_overrides(&self, overrides: &[Override]) -> Self {
-        let overrides = overrides
-            .iter()
-            .map(|item| (item.path.clone(), item.text.clone()))
-            .collect();
-        Self {
-            file: self.file.clone(),
-            overrides,
-        }
-    }
-
-    /// What gave `path` its value: the last override of it or of a section around it, else the file.
-    pub(super) fn of(&self, path: &str) -> String {
-        let covers = |set: &str| {
-            path.strip_prefix(set)
-                .is_some_and(|rest| rest.is_empty() || rest.starts_with('.'))
-        };
-        match self.overrides.iter().rev().find(|(set, _)| covers(set)) {
-            Some((_, text)) => format!("{} with --set {text}", self.file),
-            None => self.file.clone(),
-        }
-    }
-}
-
 impl Override {
+    /// Path and text, as [`super::origin::Origin`] takes them.
+    pub(super) fn named(&self) -> (&str, &str) {
+        (&self.path, &self.text)
+    }
+
     /// Reads `KEY=VALUE`.
     ///
-    /// VALUE is a TOML value; a bare word is a string, so that choices need no quotes; `none` removes an optional key.
-    /// KEY may be a section with an inline table as VALUE, which replaces the whole section.
+    /// VALUE is a TOML value; a bare word is a string, so that choices need no quotes; `none`
+    /// removes an optional key. KEY may be a section with an inline table as VALUE, which replaces
+    /// the whole section.
     ///
     /// # Errors
     /// Not of that form, a key that does not exist, or `none` for a key that cannot be absent.
@@ -157,6 +122,7 @@ fn not_optional(text: &str, path: &str) -> SpecError {
 
 #[cfg(test)]
 mod tests {
+    use super::super::origin::Origin;
     use super::*;
 
     fn value_of(text: &str) -> Option<Value> {
@@ -225,9 +191,9 @@ mod tests {
     #[test]
     fn the_origin_is_the_last_override_that_covers_the_key() {
         let parse = |text| Override::parse(text).unwrap();
-        let origin = Origin::file("a.toml").with_overrides(&[
-            parse("grid.width=[1, 1, 1, 1]"),
-            parse("uncertainty.initial={ lower = [0, 0, 0, 0] }"),
+        let origin = Origin::file("a.toml").with_overrides([
+            parse("grid.width=[1, 1, 1, 1]").named(),
+            parse("uncertainty.initial={ lower = [0, 0, 0, 0] }").named(),
         ]);
         assert_eq!(origin.of("grid.lower"), "a.toml");
         assert_eq!(

@@ -1,4 +1,5 @@
-//! The physical system: grid, fleet and droop baseline (the paper's Table I, "The GB Model", "Baseline Controller").
+//! The physical system: grid, fleet and droop baseline (the paper's Table I, "The GB Model",
+//! "Baseline Controller").
 
 use serde::{Deserialize, Serialize};
 
@@ -9,12 +10,13 @@ use serde::{Deserialize, Serialize};
 /// l' = (g + T_1 g' - l) / T_2            p' = (l - p) / T_t
 /// ```
 ///
-/// f is the deviation from 50 Hz; g, l, p are powers in GW. With K < 0 <= D the matrix is never singular (its
-/// determinant is proportional to D - K), so every held input has one equilibrium.
+/// f is the deviation from 50 Hz; g, l, p are powers in GW. With K < 0 <= D the matrix is never
+/// singular (its determinant is proportional to D - K), so every held input has one equilibrium.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct PlantSpec {
-    /// Governor gain K = 1/R_eq: power asked of the turbines per deviation; negative, as they oppose it. Table I.
+    /// Governor gain K = 1/R_eq: power asked of the turbines per deviation; negative, as they
+    /// oppose it. Table I.
     ///
     /// Unit: GW/Hz. Allowed: a number from -100 to below 0. Default: -5.
     pub governor_gain_gw_per_hz: f64,
@@ -82,7 +84,8 @@ impl Direction {
     }
 }
 
-/// The fleet of chargers, seen from the grid as one power P u with P = `N_ev` `p_av` and u in [0, 1].
+/// The fleet of chargers, seen from the grid as one power P u with P = `N_ev` `p_av` and u in [0,
+/// 1].
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct FleetSpec {
@@ -90,12 +93,13 @@ pub struct FleetSpec {
     ///
     /// Unit: 1. Allowed: a whole number from 1 to 100000000. Default: 25000.
     pub chargers: u32,
-    /// Power by which one charger moves the balance at participation 1, p_av: 28 when charging merely stops, 56 when
-    /// it reverses. Table I.
+    /// Power by which one charger moves the balance at participation 1, p_av: 28 when charging
+    /// merely stops, 56 when it reverses. Table I.
     ///
     /// Unit: kW. Allowed: a number from 0.1 to 1000. Default: 56.
     pub power_per_charger_kw: f64,
-    /// Which way a charger can move power. Decides how the firmware dispatches; the plant sees only P.
+    /// Which way a charger can move power. Decides how the firmware dispatches; the plant sees only
+    /// P.
     ///
     /// Unit: -. Allowed: "unidirectional" or "bidirectional". Default: "bidirectional".
     pub direction: Direction,
@@ -111,8 +115,8 @@ impl Default for FleetSpec {
     }
 }
 
-/// The droop controller of the paper's comparison: e = max(-f - deadband, 0) / R_ev, T_ev q' = e - D q,
-/// u = clamp(q, 0, 1), with the plant's D.
+/// The droop controller of the paper's comparison: e = max(-f - deadband, 0) / R_ev, T_ev q' = e -
+/// D q, u = clamp(q, 0, 1), with the plant's D.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct BaselineSpec {

@@ -1,19 +1,21 @@
 //! Names and types: the parsed TOML table against the table of keys.
 
+use strsim::levenshtein;
 use toml::{Table, Value};
 
 use super::SpecError;
 use super::allowed::Allowed;
 use super::keys::{self, Key};
-use super::overrides::Origin;
+use super::origin::Origin;
 
 /// Checks that every key of the document exists and holds a value of its type.
 ///
 /// # Errors
-/// The first unknown key or wrong type. Whole numbers and choices are checked entirely, as they have no other form in a
-/// [`super::Spec`]; ranges of numbers are left to `validate`.
+/// The first unknown key or wrong type. Whole numbers and choices are checked entirely, as they
+/// have no other form in a [`super::Spec`]; ranges of numbers are left to `validate`.
 pub(super) fn check(document: &Table, origin: &Origin) -> Result<(), SpecError> {
-    // Sections nest two deep; a list of what is still to be seen bounds the loop by the size of the document.
+    // Sections nest two deep; a list of what is still to be seen bounds the loop by the size of the
+    // document.
     let mut pending: Vec<(String, &Table)> = vec![(String::new(), document)];
     while let Some((section, table)) = pending.pop() {
         for (name, value) in table {
@@ -114,7 +116,8 @@ fn wrong_type(origin: &Origin, path: &str, value: &Value, allowed: String) -> Sp
 
 /// The error for a key that does not exist, with the nearest one that does.
 pub(super) fn unknown_key(origin: String, path: &str) -> SpecError {
-    // What is allowed is listed for the innermost section that exists: for `grid.lower.x` that is `grid`.
+    // What is allowed is listed for the innermost section that exists: for `grid.lower.x` that is
+    // `grid`.
     let mut section = keys::section_of(path);
     while !section.is_empty() && !keys::is_section(section) {
         section = keys::section_of(section);
@@ -127,8 +130,8 @@ pub(super) fn unknown_key(origin: String, path: &str) -> SpecError {
     }
 }
 
-/// The existing key or section most like `path`, if any is like it: few edits on the whole path, the name without its
-/// unit, or the right name in the wrong section.
+/// The existing key or section most like `path`, if any is like it: few edits on the whole path,
+/// the name without its unit, or the right name in the wrong section.
 fn nearest(path: &str) -> Option<&'static str> {
     let name = last(path);
     let sections = keys::KEYS
@@ -150,32 +153,16 @@ fn distance(path: &str, candidate: &str) -> usize {
     let without_unit = candidate
         .strip_prefix(path)
         .is_some_and(|rest| rest.starts_with('_'));
-    let moved = 1 + edits(last(path), last(candidate));
+    let moved = 1 + levenshtein(last(path), last(candidate));
     if without_unit {
         1
     } else {
-        edits(path, candidate).min(moved)
+        levenshtein(path, candidate).min(moved)
     }
 }
 
 fn last(path: &str) -> &str {
     path.rsplit_once('.').map_or(path, |(_, name)| name)
-}
-
-/// Levenshtein distance between two names, by rows.
-fn edits(a: &str, b: &str) -> usize {
-    let b: Vec<char> = b.chars().collect();
-    let mut row: Vec<usize> = (0..=b.len()).collect();
-    for (i, from) in a.chars().enumerate() {
-        let mut diagonal = row[0];
-        row[0] = i + 1;
-        for (j, to) in b.iter().enumerate() {
-            let replaced = diagonal + usize::from(from != *to);
-            diagonal = row[j + 1];
-            row[j + 1] = replaced.min(row[j] + 1).min(row[j + 1] + 1);
-        }
-    }
-    row[b.len()]
 }
 
 #[cfg(test)]
@@ -184,9 +171,9 @@ mod tests {
 
     #[test]
     fn edits_are_counted() {
-        assert_eq!(edits("", "abc"), 3);
-        assert_eq!(edits("kitten", "sitting"), 3);
-        assert_eq!(edits("same", "same"), 0);
+        assert_eq!(levenshtein("", "abc"), 3);
+        assert_eq!(levenshtein("kitten", "sitting"), 3);
+        assert_eq!(levenshtein("same", "same"), 0);
     }
 
     #[test]

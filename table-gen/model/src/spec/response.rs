@@ -3,9 +3,8 @@
 use firmware::response::WINDOW_TICKS_MAX;
 
 use super::meter::MeterKind;
-use super::overrides::Origin;
+use super::origin::{Origin, inconsistent};
 use super::sampling::to_whole_ms;
-use super::validate::inconsistent;
 use super::{Spec, SpecError};
 use crate::table_fields;
 

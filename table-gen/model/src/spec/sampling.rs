@@ -6,8 +6,8 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct InputSpec {
-    /// Distance between participations; must divide 1, with at most 32 levels (the allowed inputs of a cell are a mask
-    /// of 32 bits). The paper's "Symbolic Control for the Grid".
+    /// Distance between participations; must divide 1, with at most 32 levels (the allowed inputs
+    /// of a cell are a mask of 32 bits). The paper's "Symbolic Control for the Grid".
     ///
     /// Unit: 1. Allowed: a number from 0.001 to 1. Default: 0.05.
     pub step: f64,
@@ -26,8 +26,8 @@ impl InputSpec {
         self.intervals().saturating_add(1)
     }
 
-    /// Participation of a level, in [0, 1]: level / (levels - 1), so that the ends are exact; levels past the last
-    /// give 1.
+    /// Participation of a level, in [0, 1]: level / (levels - 1), so that the ends are exact;
+    /// levels past the last give 1.
     #[must_use]
     pub fn value(&self, level: usize) -> f64 {
         let intervals = self.intervals();
@@ -43,14 +43,14 @@ impl InputSpec {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct SamplingSpec {
-    /// Sampling time tau: in C1, C2 and Hold a decision is made and held for this long. Not printed in the paper;
-    /// 1.5 is where its bidirectional loop settles. A whole number of `watch_s`.
+    /// Sampling time tau: in C1, C2 and Hold a decision is made and held for this long. Not printed
+    /// in the paper; 1.5 is where its bidirectional loop settles. A whole number of `watch_s`.
     ///
     /// Unit: s. Allowed: a number from 0.001 to 3600. Default: 1.5.
     pub period_s: f64,
-    /// Watch tick: in No control and Fixed the phase is examined this often, and tau's clock starts at the switch.
-    /// A whole number of milliseconds, at most 65535 to the period. At most half of the
-    /// time after which a charger's watchdog bites.
+    /// Watch tick: in No control and Fixed the phase is examined this often, and tau's clock starts
+    /// at the switch. A whole number of milliseconds, at most 65535 to the period. At most half of
+    /// the time after which a charger's watchdog bites.
     ///
     /// Unit: s. Allowed: a number from 0.001 to 0.2. Default: 0.1.
     pub watch_s: f64,
@@ -98,7 +98,8 @@ pub(super) fn to_ms(time_s: f64) -> u32 {
 
 /// `time_s` in milliseconds where it is a whole number of them.
 ///
-/// The tolerance, a picosecond, covers decimal noise up to an hour: 3.6e6 ms, where a rounding errs by 2.4e-10 ms.
+/// The tolerance, a picosecond, covers decimal noise up to an hour: 3.6e6 ms, where a rounding errs
+/// by 2.4e-10 ms.
 pub(super) fn to_whole_ms(time_s: f64) -> Option<u32> {
     const TOLERANCE_MS: f64 = 1e-9;
     let scaled = time_s * 1e3;
@@ -137,8 +138,9 @@ pub struct MethodSpec {
     ///
     /// Unit: -. Allowed: "growth-bound" or "exact-linear". Default: "growth-bound".
     pub successor: Successor,
-    /// Whether the games themselves keep f above containment, and in I2 under Hold, between the samples too: inputs whose
-    /// reach tube over a period leaves the band are not allowed. The literature's games bound the samples alone.
+    /// Whether the games themselves keep f above containment, and in I2 under Hold, between the
+    /// samples too: inputs whose reach tube over a period leaves the band are not allowed. The
+    /// literature's games bound the samples alone.
     ///
     /// Unit: -. Allowed: true or false. Default: false.
     pub between_samples: bool,

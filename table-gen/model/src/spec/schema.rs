@@ -9,14 +9,16 @@ use super::{
 
 /// A complete specification; one field per section of the TOML document.
 ///
-/// `Spec::default()` holds every key's documented default. A spec from [`Spec::load`] or [`Spec::from_toml`] has been
-/// validated; one that was put together or changed in code should pass [`Spec::validate`] before use.
+/// `Spec::default()` holds every key's documented default. A spec from [`Spec::load`] or
+/// [`Spec::from_toml`] has been validated; one that was put together or changed in code should pass
+/// [`Spec::validate`] before use.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Spec {
     /// Name for reports and file names.
     ///
-    /// Unit: -. Allowed: 1 to 64 ASCII letters, digits, - _ or ., the first a letter or digit. Default: "unnamed".
+    /// Unit: -. Allowed: 1 to 64 ASCII letters, digits, - _ or ., the first a letter or digit.
+    /// Default: "unnamed".
     pub name: String,
     /// The grid's frequency dynamics without the fleet (the paper's Table I).
     pub plant: PlantSpec,
@@ -68,7 +70,8 @@ impl Default for Spec {
 }
 
 impl Spec {
-    /// P = `N_ev` `p_av`: the power in GW by which the whole fleet can move the balance at participation 1.
+    /// P = `N_ev` `p_av`: the power in GW by which the whole fleet can move the balance at
+    /// participation 1.
     ///
     /// 1.4 GW for the paper's bidirectional fleet, 0.7 GW for the unidirectional one.
     #[must_use]

@@ -4,7 +4,7 @@ use firmware::prediction::DELAY_TICKS_MAX;
 
 use super::allowed::{self, Allowed};
 use super::keys::{KEYS, Key, KeyValue};
-use super::overrides::Origin;
+use super::origin::{Origin, inconsistent};
 use super::sampling::{to_ms, to_whole_ms};
 use super::{
     InputSpec, RequirementsSpec, SamplingSpec, Spec, SpecError, UncertaintySpec, formula, geometry,
@@ -18,10 +18,11 @@ const LEVELS_MAX: usize = 32;
 const TICKS_MAX: u32 = u16::MAX as u32;
 
 impl Spec {
-    /// Checks every value and every relation between values; `origin` is what error messages call the spec.
+    /// Checks every value and every relation between values; `origin` is what error messages call
+    /// the spec.
     ///
-    /// [`Spec::load`] and [`Spec::from_toml`] have done it already. Whether the grid fits in memory depends on the
-    /// machine and on the moment; all else depends on the spec alone.
+    /// [`Spec::load`] and [`Spec::from_toml`] have done it already. Whether the grid fits in memory
+    /// depends on the machine and on the moment; all else depends on the spec alone.
     ///
     /// # Errors
     /// The first value that is not finite, out of its key's range, or inconsistent with others.
@@ -287,20 +288,5 @@ fn check_requirements(requirements: &RequirementsSpec, origin: &Origin) -> Resul
             ))
         }
         _ => Ok(()),
-    }
-}
-
-/// A value in its own range that does not go with the others.
-pub(super) fn inconsistent(
-    origin: &Origin,
-    key: &'static str,
-    found: impl Into<String>,
-    allowed: impl Into<String>,
-) -> SpecError {
-    SpecError::Inconsistent {
-        origin: origin.of(key),
-        key,
-        found: found.into(),
-        allowed: allowed.into(),
     }
 }

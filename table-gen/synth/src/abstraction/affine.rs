@@ -20,9 +20,10 @@
 //! e on each axis. The real state before the step lies in the cell widened by e; the estimate after
 //! it in the successor widened by e again.
 
+mod block_tables;
 mod blocks;
 
-use self::blocks::BlockTables;
+use self::block_tables::BlockTables;
 use super::{Abstraction, BlockCore, BlockExtents, CellBox, Extents};
 use model::flow::{Flow, Matrix, Vector, absolute_integral, metzler};
 use model::grid_shape::GridShape;
@@ -126,7 +127,7 @@ struct Mode<const D: usize> {
 }
 
 #[derive(Debug, Clone, Copy)]
-struct Step<const D: usize> {
+struct InputStep<const D: usize> {
     mode: usize,
     offset: [i64; D],
     span: [i64; D],
@@ -137,7 +138,7 @@ struct Step<const D: usize> {
 pub struct AffineAbstraction<const D: usize> {
     shape: GridShape<D>,
     modes: Vec<Mode<D>>,
-    steps: Vec<Step<D>>,
+    steps: Vec<InputStep<D>>,
     extents: Extents<D>,
     blocks: BlockTables<D>,
 }
@@ -207,7 +208,7 @@ impl<const D: usize> AffineAbstraction<D> {
                 None => modes[mode].drift(input.drive),
             };
             let (offset, span) = modes[mode].step(&shape, &drift, errors.after)?;
-            steps.push(Step { mode, offset, span });
+            steps.push(InputStep { mode, offset, span });
         }
         let mut extents = Extents {
             min: [u32::MAX; D],

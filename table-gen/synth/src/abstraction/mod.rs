@@ -8,6 +8,7 @@
 
 pub mod affine;
 pub mod growth;
+pub mod guard;
 pub mod invariant;
 pub mod tube;
 

@@ -1,27 +1,32 @@
-//! One state between the samples: a guard that permits an input only if the state stays in a band over the whole period.
+//! One state between the samples: a guard that permits an input only if the state stays in a band
+//! over the whole period.
 //!
-//! The period is cut into pieces. At each cut the state is an affine function of the cell's centre, with a radius for the
-//! cell, the error of the estimate and what the drive's variation has added so far. Between two cuts
+//! The period is cut into pieces. At each cut the state is an affine function of the cell's centre,
+//! with a radius for the cell, the error of the estimate and what the drive's variation has added
+//! so far. Between two cuts
 //!
-//! - the part driven by the drive's middle is smooth; it leaves the chord by at most `h²/8 max|x''|`, and the chord's
-//!   ends are at the cuts. `x''` is bounded over the whole grid, all inputs and the whole period (`bend`);
-//! - the cell's and the estimate's part is again the flow of a linear system from a point, covered by the same bound with
-//!   the grid widened by the error;
-//! - the drive's variation adds `r ∫₀ˢ |exp(A t) b| dt`, which only grows: its value at the later cut covers the piece.
+//! - the part driven by the drive's middle is smooth; it leaves the chord by at most `h²/8
+//!   max|x''|`, and the chord's ends are at the cuts. `x''` is bounded over the whole grid, all
+//!   inputs and the whole period (`bend`);
+//! - the cell's and the estimate's part is again the flow of a linear system from a point, covered
+//!   by the same bound with the grid widened by the error;
+//! - the drive's variation adds `r ∫₀ˢ |exp(A t) b| dt`, which only grows: its value at the later
+//!   cut covers the piece.
 //!
-//! **Rounding.** Coefficients are intervals whose radii are multiplied by the largest value they meet and added to the
-//! radius; sums run in f64 over at most D + 2 terms, each below 2^40, so their rounding is below 2^-10 of a unit,
-//! which `SUM_SLACK` covers.
+//! **Rounding.** Coefficients are intervals whose radii are multiplied by the largest value they
+//! meet and added to the radius; sums run in f64 over at most D + 2 terms, each below 2^40, so
+//! their rounding is below 2^-10 of a unit, which `SUM_SLACK` covers.
 
 use super::affine::AffineInput;
-use crate::game::guard::Guard;
+use crate::abstraction::guard::Guard;
 use model::flow::{Flow, absolute_integral, apply, product, tube};
 use model::grid_shape::GridShape;
 use model::interval::Interval;
 
 /// Cuts of the period.
 const PIECES: usize = 32;
-/// Covers the rounding of the sums at run time \[plant units, which are micro-units for the charger's plant\].
+/// Covers the rounding of the sums at run time \[plant units, which are micro-units for the
+/// charger's plant\].
 const SUM_SLACK: f64 = 0.01;
 
 /// The state of one axis at one cut.
@@ -42,7 +47,8 @@ pub struct TubeGuard<const D: usize> {
 }
 
 impl<const D: usize> TubeGuard<D> {
-    /// A guard for an axis and a band \[plant units\]; the inputs must share one mode (one A and b).
+    /// A guard for an axis and a band \[plant units\]; the inputs must share one mode (one A and
+    /// b).
     pub fn new(
         shape: &GridShape<D>,
         inputs: &[AffineInput<D>],
@@ -98,8 +104,9 @@ impl<const D: usize> TubeGuard<D> {
     }
 }
 
-/// Bound of `|x''|` on an axis over a period from anywhere in the grid widened by the error, for inputs held at the
-/// middle of their drive: `x'' = A (A x + b v)`, with x enclosed piece by piece by `exp(A [0, h]) x_i + Γ([0, h]) v`.
+/// Bound of `|x''|` on an axis over a period from anywhere in the grid widened by the error, for
+/// inputs held at the middle of their drive: `x'' = A (A x + b v)`, with x enclosed piece by piece
+/// by `exp(A [0, h]) x_i + Γ([0, h]) v`.
 fn bend<const D: usize>(
     shape: &GridShape<D>,
     inputs: &[AffineInput<D>],

@@ -1,10 +1,12 @@
-//! Guarantee against bytes: variants of a spec, each synthesised and compressed, and which of them nothing beats.
+//! Guarantee against bytes: variants of a spec, each synthesised and compressed, and which of them
+//! nothing beats.
 
 use plotters::prelude::*;
 use serde::Serialize;
 
-use crate::compress::{self, CompressError, Options};
+use crate::compress::{CompressError, Options};
 use crate::game::{GameError, Watch};
+use crate::pipeline::{self, Encoding, PipelineError};
 use crate::synthesis::{self, SynthesisError};
 use model::spec::Spec;
 
@@ -79,24 +81,23 @@ pub fn try_variant<'w>(
         }
     };
     outcome.winning_cells = Some(synthesis.c1.solution.winning);
-    match compress::table(&spec, &synthesis, options, watch) {
-        Ok((bytes, laws)) => {
-            let steps: u32 = laws
-                .laws
-                .iter()
-                .map(|law| u32::from(law.report.steps))
-                .sum();
-            outcome.table_bytes = Some(bytes.len());
+    match pipeline::emit(&synthesis, Encoding::Tree(*options), watch) {
+        Ok(emitted) => {
+            let laws = emitted.laws.iter();
+            let steps: u32 = laws.map(|law| u32::from(law.report.steps)).sum();
+            outcome.table_bytes = Some(emitted.bytes.len());
             outcome.settle_s = Some(f64::from(steps) * variant.period_s);
         }
-        Err(CompressError::Game(GameError::Interrupted)) => return Err(GameError::Interrupted),
+        Err(PipelineError::Compress(CompressError::Game(GameError::Interrupted))) => {
+            return Err(GameError::Interrupted);
+        }
         Err(error) => outcome.reason = Some(error.to_string()),
     }
     Ok(outcome)
 }
 
-/// Marks the outcomes that no other beats: one that bears at least as much participation error, is no larger and no
-/// slower, and better in one of the three.
+/// Marks the outcomes that no other beats: one that bears at least as much participation error, is
+/// no larger and no slower, and better in one of the three.
 pub fn mark_pareto(outcomes: &mut [Outcome]) {
     let keys: Vec<Option<(f64, usize, f64)>> = outcomes
         .iter()
@@ -113,7 +114,8 @@ pub fn mark_pareto(outcomes: &mut [Outcome]) {
 /// Size of the picture \[px\].
 const SIZE: (u32, u32) = (720, 440);
 
-/// Bytes (logarithmic) against settling time as an SVG, every point with its variant; the front is filled.
+/// Bytes (logarithmic) against settling time as an SVG, every point with its variant; the front is
+/// filled.
 ///
 /// # Errors
 /// What the drawing library could not draw.

@@ -22,7 +22,8 @@ impl LabelledCell {
     }
 }
 
-/// The cells of a grid that have labels, in the dense order. `labels` is asked for every dense index.
+/// The cells of a grid that have labels, in the dense order. `labels` is asked for every dense
+/// index.
 pub fn labelled_cells(
     shape: &GridShape<STATES>,
     labels: impl Fn(usize, [u16; STATES]) -> u64 + Sync,
@@ -41,6 +42,18 @@ pub fn labelled_cells(
             })
         })
         .collect()
+}
+
+/// Lowest and highest cell on each axis.
+pub(super) fn bounds(cells: &[LabelledCell]) -> ([u16; STATES], [u16; STATES]) {
+    let (mut low, mut high) = ([u16::MAX; STATES], [0u16; STATES]);
+    for cell in cells {
+        for d in 0..STATES {
+            low[d] = low[d].min(cell.cell[d]);
+            high[d] = high[d].max(cell.cell[d]);
+        }
+    }
+    (low, high)
 }
 
 #[cfg(test)]

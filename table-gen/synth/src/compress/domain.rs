@@ -1,15 +1,16 @@
-//! The domain of a law: which winning cells its table part covers, so that the game is still won inside.
+//! The domain of a law: which winning cells its table part covers, so that the game is still won
+//! inside.
 //!
-//! Giving a cell up takes away a place for its predecessors to go. So after each description the game is played again
-//! inside what was kept, and what it loses there is no longer winning; until the description covers exactly the cells
-//! that the game wins inside it.
+//! Giving a cell up takes away a place for its predecessors to go. So after each description the
+//! game is played again inside what was kept, and what it loses there is no longer winning; until
+//! the description covers exactly the cells that the game wins inside it.
 
 use firmware::table::LookAhead;
 
 use super::CompressError;
 use rayon::prelude::*;
 
-use super::facets::{Point, hull, normals, tightened};
+use super::half_spaces::{Point, hull, normals, tightened};
 use super::look_aheads;
 use super::membership::{DomainPart, Predicates, describe};
 use crate::abstraction::Abstraction;
@@ -28,7 +29,8 @@ pub const GIVE_UP_ONE_IN: usize = 100;
 const ROUNDS: u32 = 5;
 /// Positions of each half-space of the hull that a leaf may name.
 const TIGHTENINGS: u32 = 4;
-/// Most nodes on a path of a membership tree: below the bits of the four axes boxes could only be halved.
+/// Most nodes on a path of a membership tree: below the bits of the four axes boxes could only be
+/// halved.
 pub const DEPTH_MAX: u32 = 32;
 
 /// A law's game and where it is asked.
@@ -107,8 +109,8 @@ impl Play<'_> {
         }
     }
 
-    /// A domain that look-aheads alone describe, if there is one: no losing cell is inside, at most the budget is given
-    /// up, and the game inside is won everywhere.
+    /// A domain that look-aheads alone describe, if there is one: no losing cell is inside, at most
+    /// the budget is given up, and the game inside is won everywhere.
     fn by_look_ahead(&self, all: &BitSet) -> Result<Option<Domain>, CompressError> {
         let Some(target) = self.target else {
             return Ok(None);

@@ -27,7 +27,8 @@ pub fn encode_inputs(tree: &Tree, laws: &[AffineFunction]) -> Result<Vec<u8>, Co
     Ok(out)
 }
 
-/// The bytes of a subtree whose box begins at `low`. Recursion is as deep as the tree, which `build` bounds.
+/// The bytes of a subtree whose box begins at `low`. Recursion is as deep as the tree, which
+/// `build` bounds.
 fn encode_below(tree: &Tree, low: [u16; STATES]) -> Result<Vec<u8>, CompressError> {
     let (plane, left, right) = match tree {
         Tree::Leaf(value) => return Ok(vec![*value]),
@@ -67,7 +68,7 @@ fn encode_below(tree: &Tree, low: [u16; STATES]) -> Result<Vec<u8>, CompressErro
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::compress::split::Plane;
+    use crate::compress::best_plane::Plane;
 
     fn split(axis: usize, threshold: u16, left: Tree, right: Tree) -> Tree {
         Tree::Split {

@@ -1,9 +1,11 @@
-//! A law's inputs as a small tree: choose laws, rank the game by them, build the tree, rank again by the tree's choices.
+//! A law's inputs as a small tree: choose laws, rank the game by them, build the tree, rank again
+//! by the tree's choices.
 //!
-//! The masks of a minimal-time game leave little freedom near the target: an input is allowed only if it is as fast as
-//! the best. Ranked by a simple controller instead, the same cells are won in more steps and far more inputs are
-//! allowed, among them nearly always the simple one. A tree that picks any allowed input in every cell lowers the rank in
-//! every step, so it wins; ranked by its own choices, the game can only gain freedom or lose useless one.
+//! The masks of a minimal-time game leave little freedom near the target: an input is allowed only
+//! if it is as fast as the best. Ranked by a simple controller instead, the same cells are won in
+//! more steps and far more inputs are allowed, among them nearly always the simple one. A tree that
+//! picks any allowed input in every cell lowers the rank in every step, so it wins; ranked by its
+//! own choices, the game can only gain freedom or lose useless one.
 
 use firmware::grid::Cell;
 use firmware::table::AffineFunction;
@@ -11,7 +13,7 @@ use firmware::table::AffineFunction;
 use super::CompressError;
 use super::cells::{LabelledCell, labelled_cells};
 use super::encode::encode_inputs;
-use super::law_set::{LawSet, choose_laws};
+use super::piece_set::{PieceSet, choose_pieces};
 use super::tree::{Tree, build};
 use crate::abstraction::Abstraction;
 use crate::abstraction::affine::AffineAbstraction;
@@ -30,7 +32,7 @@ pub struct CompressedInputs {
     /// The tree.
     pub tree: Tree,
     /// The affine laws that it names.
-    pub laws: LawSet,
+    pub laws: PieceSet,
     /// The inputs part.
     pub bytes: Vec<u8>,
     /// Worst-case steps of the tree's controller; 0 in a safety game.
@@ -71,7 +73,7 @@ impl InputsTask<'_> {
     pub fn run(&self) -> Result<CompressedInputs, CompressError> {
         let levels = self.abstraction.inputs() as u8;
         let cells = self.cells(self.solution);
-        let laws = choose_laws(self.candidates, levels, &cells);
+        let laws = choose_pieces(self.candidates, levels, &cells);
         drop(cells);
         let mut best = self.attempt(&laws, self.solution, self.worst_rank(self.solution))?;
         let Some(target) = self.target else {
@@ -81,7 +83,7 @@ impl InputsTask<'_> {
             return Ok(best);
         }
         let mut solution = self.ranked_by(&laws, target)?;
-        let laws = choose_laws(self.candidates, levels, &self.cells(&solution));
+        let laws = choose_pieces(self.candidates, levels, &self.cells(&solution));
         for _ in 0..self.rounds {
             let next = self.attempt(&laws, &solution, 0)?;
             let choice = |_: usize, cell: [u32; STATES]| {
@@ -90,7 +92,8 @@ impl InputsTask<'_> {
                 1u32 << next.laws.level(leaf, cell)
             };
             let again = self.reach(target, &choice, false)?;
-            // Where another law may answer instead, the ranks that the tree was made from bound both.
+            // Where another law may answer instead, the ranks that the tree was made from bound
+            // both.
             let steps = match self.others {
                 None => self.worst_rank(&again),
                 Some(_) => self.worst_rank(&solution),
@@ -109,9 +112,14 @@ impl InputsTask<'_> {
         Ok(best)
     }
 
-    /// The game ranked by the first of some laws: it wins what it can alone, all inputs help where it cannot go on.
-    pub(super) fn ranked_by(&self, laws: &LawSet, target: &BitSet) -> Result<Solution, GameError> {
-        let first = |_: usize, cell: [u32; STATES]| match laws.laws.first() {
+    /// The game ranked by the first of some laws: it wins what it can alone, all inputs help where
+    /// it cannot go on.
+    pub(super) fn ranked_by(
+        &self,
+        laws: &PieceSet,
+        target: &BitSet,
+    ) -> Result<Solution, GameError> {
+        let first = |_: usize, cell: [u32; STATES]| match laws.pieces.first() {
             Some(law) => 1u32 << law.level(Cell(cell.map(|i| i as u16)), laws.levels),
             None => 0,
         };
@@ -165,7 +173,7 @@ impl InputsTask<'_> {
 
     fn attempt(
         &self,
-        laws: &LawSet,
+        laws: &PieceSet,
         solution: &Solution,
         steps: u16,
     ) -> Result<CompressedInputs, CompressError> {
@@ -192,7 +200,7 @@ impl InputsTask<'_> {
         }
         drop(cells);
         let (laws, tree) = laws.used(&tree);
-        let bytes = encode_inputs(&tree, &laws.laws)?;
+        let bytes = encode_inputs(&tree, &laws.pieces)?;
         Ok(CompressedInputs {
             tree,
             laws,

@@ -1,10 +1,11 @@
-//! Look-aheads for a law's domain: what the abstraction would do under the strongest input and under none, in the
-//! device's integers.
+//! Look-aheads for a law's domain: what the abstraction would do under the strongest input and
+//! under none, in the device's integers.
 //!
-//! Below the target only the strongest input keeps f off its limit, and the near corner of the successor box is its lower
-//! one; above the target it is no input and the upper corner. Everything else about the set, that its edge is monotone
-//! and that no other corner matters, is a guess that fits a stable plant with one input: the description of the domain
-//! asks every cell and uses a look-ahead only where it covers no losing one.
+//! Below the target only the strongest input keeps f off its limit, and the near corner of the
+//! successor box is its lower one; above the target it is no input and the upper corner. Everything
+//! else about the set, that its edge is monotone and that no other corner matters, is a guess that
+//! fits a stable plant with one input: the description of the domain asks every cell and uses a
+//! look-ahead only where it covers no losing one.
 
 use firmware::grid::{Cell, Grid};
 use firmware::table::{LOOK_AHEAD_LEN, LOOK_AHEAD_SHIFT_MAX, LookAhead};
@@ -13,11 +14,11 @@ use rayon::prelude::*;
 
 use crate::abstraction::Abstraction;
 use crate::abstraction::affine::AffineAbstraction;
+use crate::drives::net_power;
 use crate::game::bitset::BitSet;
-use crate::synthesis::{self, net_power};
 use model::flow::Flow;
 use model::interval::Interval;
-use model::plant::{GridPlant, STATES};
+use model::plant::{Plant, STATES};
 use model::spec::Spec;
 
 /// Most steps tried: f has turned by then.
@@ -28,8 +29,8 @@ const STEPS_MAX: u8 = 6;
 pub struct Margins {
     /// All bounds \[cells / 128\]: for the rounding of the factors.
     pub all: i32,
-    /// The near bound of l on top of that \[cells / 128\]: a box's other cells have a higher f and so a lower l, and the
-    /// near corner does not see them.
+    /// The near bound of l on top of that \[cells / 128\]: a box's other cells have a higher f and
+    /// so a lower l, and the near corner does not see them.
     pub near_l: i32,
 }
 
@@ -61,8 +62,9 @@ enum Course {
     Fall,
 }
 
-/// One look-ahead for the cells below the target and one for those above it, with as few steps as tell losing cells best;
-/// none where there are no such cells, or where the format cannot hold the numbers.
+/// One look-ahead for the cells below the target and one for those above it, with as few steps as
+/// tell losing cells best; none where there are no such cells, or where the format cannot hold the
+/// numbers.
 pub fn choose(
     spec: &Spec,
     abstraction: &AffineAbstraction<STATES>,
@@ -109,8 +111,8 @@ pub fn choose(
         .collect()
 }
 
-/// The winning cells that look-aheads keep: below the target by the first, above it by the second, between them all.
-/// `None` if they cover a losing cell, or if one is missing.
+/// The winning cells that look-aheads keep: below the target by the first, above it by the second,
+/// between them all. `None` if they cover a losing cell, or if one is missing.
 pub fn covered(
     abstraction: &AffineAbstraction<STATES>,
     target: &BitSet,
@@ -175,8 +177,8 @@ fn look_ahead(
         Course::Rise => abstraction.inputs() - 1,
         Course::Fall => 0,
     };
-    let (a, b) = GridPlant::new(spec).matrices();
-    let flow = Flow::over(&a, &b, synthesis::period_s(spec));
+    let (a, b) = Plant::new(spec).matrices();
+    let flow = Flow::over(&a, &b, f64::from(spec.sampling.period_ms()) / 1000.0);
     let phi = flow.phi.map(|row| row.map(Interval::mid));
     let drive = net_power(spec, input).mid();
     let radius = abstraction.radius(input);
@@ -194,7 +196,8 @@ fn look_ahead(
         .rev()
         .find(|shift| largest * f64::from(1u32 << shift) < f64::from(i16::MAX))?;
     let unit = f64::from(1u32 << shift);
-    // Downwards for a lower corner, upwards for an upper one: on the device's integers the box is never smaller.
+    // Downwards for a lower corner, upwards for an upper one: on the device's integers the box is
+    // never smaller.
     let apart =
         |d: usize, more: i32| radius[d] / shape.width[d] + f64::from(margins.all + more) / 128.0;
     let lower = |d: usize, more: i32| ((centre(d) - apart(d, more)) * unit).floor() as i32;

@@ -1,9 +1,10 @@
-//! The domain of a law as bytes: a tree whose leaves are outside, inside, half-spaces or look-aheads, exact or with cells
-//! given up.
+//! The domain of a law as bytes: a tree whose leaves are outside, inside, half-spaces or
+//! look-aheads, exact or with cells given up.
 //!
-//! No losing cell may be inside, ever. Winning cells may be given up: the tree is grown until it is exact, then pruned
-//! from below, with a price in bytes on each cell given up. The lowest price that stays within the budget is found by
-//! bisection. So the budget goes where the boundary is most ragged.
+//! No losing cell may be inside, ever. Winning cells may be given up: the tree is grown until it is
+//! exact, then pruned from below, with a price in bytes on each cell given up. The lowest price
+//! that stays within the budget is found by bisection. So the budget goes where the boundary is
+//! most ragged.
 
 use firmware::grid::Cell;
 use firmware::table::{
@@ -14,13 +15,14 @@ use firmware::table::{
 use rayon::prelude::*;
 
 use super::CompressError;
+use super::best_plane::{Plane, best_plane, widest_plane};
 use super::cells::LabelledCell;
 use super::encode::encode_nodes;
-use super::split::{Plane, best_plane, widest_plane};
 use super::tree::{Tree, cut, depth_by_halving};
 use model::plant::STATES;
 
-/// Bytes that a leaf adds to a tree, nodes included: between 2 and 2.5, see `firmware::table::Node`.
+/// Bytes that a leaf adds to a tree, nodes included: between 2 and 2.5, see
+/// `firmware::table::Node`.
 const LEAF_BYTES: f64 = 2.2;
 /// Halvings of the bracket of the price.
 const BISECTIONS: u32 = 30;
@@ -184,8 +186,8 @@ fn prune(grown: &Grown, price: f64) -> (f64, u32, Tree) {
     (left_cost + right_cost, left_missed + right_missed, tree)
 }
 
-/// Describes the winning among some cells of a grid with `count` cells; cells that are not listed may come out either way.
-/// At most `budget` winning cells are given up.
+/// Describes the winning among some cells of a grid with `count` cells; cells that are not listed
+/// may come out either way. At most `budget` winning cells are given up.
 ///
 /// # Errors
 /// A tree that the format cannot hold.

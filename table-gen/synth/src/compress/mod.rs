@@ -2,47 +2,50 @@
 //!
 //! | file | does |
 //! |---|---|
-//! | [`deadbeat`] | candidate affine laws |
-//! | [`law_set`] | chooses among them, and says which leaves are right in a cell |
+//! | [`candidate_pieces`] | candidate affine laws |
+//! | [`piece_set`] | chooses among them, and says which leaves are right in a cell |
 //! | [`cells`] | the cells of a domain with their right leaves |
-//! | [`split`], [`tree`] | a small k-d tree over them |
+//! | [`best_plane`], [`tree`] | a small k-d tree over them |
 //! | [`inputs`] | the whole of it for a law: laws, ranks, tree, ranks by the tree, … |
-//! | [`facets`] | half-spaces that bound a winning set |
+//! | [`half_spaces`] | half-spaces that bound a winning set |
 //! | [`look_aheads`] | what a held input would do, in integers |
 //! | [`membership`] | a set of cells as a tree with half-spaces, exact or with cells given up |
 //! | [`domain`] | the domain of a law, in which its game is won again |
 //! | [`encode`] | trees as bytes |
-//! | `winning`, `asked` | the laws of a table: every winning cell, or what the closed loop asks for |
+//! | `winning_domain` | the laws of a table for every winning cell |
+//! | `reachable_domain` | the laws of a table for what the closed loop asks for |
 //! | [`recheck`] | the emitted bytes, played again |
 //!
-//! A law's table part is sound by itself: every input that it gives inside its domain is one that the game allows there.
+//! A law's table part is sound by itself: every input that it gives inside its domain is one that
+//! the game allows there.
 
-mod asked;
+pub mod best_plane;
+pub mod candidate_pieces;
 pub mod cells;
-pub mod deadbeat;
 pub mod domain;
 pub mod encode;
-pub mod facets;
+pub mod error;
+pub mod half_spaces;
 pub mod inputs;
-pub mod law_set;
 pub mod look_aheads;
 pub mod membership;
-pub mod narrow;
+pub mod piece_set;
 pub mod reachable;
+pub mod reachable_controller;
+mod reachable_domain;
 pub mod recheck;
-pub mod split;
 pub mod tree;
-mod winning;
+mod winning_domain;
 
-use firmware::grid::Grid;
 use firmware::table::{InputsKind, LAWS, Law, LawEntry, TableView};
 
 use crate::abstraction::affine::AffineAbstraction;
-use crate::delay::DelayError;
 use crate::emit::{self, EmitError, EncodedLaw};
 use crate::game::bitset::BitSet;
-use crate::game::{GameError, NOT_WON, Watch};
+use crate::game::{NOT_WON, Watch};
+use crate::problem::Problem;
 use crate::synthesis::{self, OptionalGuard, SolvedLaw, Synthesis, SynthesisError};
+pub use error::CompressError;
 use inputs::CompressedInputs;
 use membership::DomainPart;
 use model::plant::STATES;
@@ -82,8 +85,8 @@ pub struct CompressedLaw {
 pub struct LawReport {
     /// Cells that the game won, target not counted.
     pub winning_cells: usize,
-    /// Cells from which the table leads to the law's target: those of its domain, and for a C2 that is asked in I1 alone
-    /// those of C1.
+    /// Cells from which the table leads to the law's target. They are the cells of its domain; for a C2
+    /// that is asked in I1 alone, those of C1 too.
     pub domain_cells: usize,
     /// Leaves of the membership tree.
     pub domain_leaves: u32,
@@ -129,60 +132,25 @@ impl CompressedLaws {
     }
 }
 
-/// Why compression has no result.
-#[derive(Debug, thiserror::Error)]
-pub enum CompressError {
-    /// The abstraction cannot be built.
-    #[error(transparent)]
-    Synthesis(#[from] SynthesisError),
-    /// A delay that the device cannot predict over.
-    #[error(transparent)]
-    Delay(#[from] DelayError),
-    /// A game inside compression has no result.
-    #[error("while ranking the compressed law: {0}")]
-    Game(#[from] GameError),
-    /// The closed loop cannot be explored.
-    #[error(
-        "table.domain = \"reachable\" needs an exactly known event or requirements.stay = true: in Fixed nothing bounds \
-         where an uncertain state goes; use table.domain = \"winning\""
-    )]
-    Unbounded,
-    /// The closed loop leaves the laws.
-    #[error(
-        "the closed loop reaches a state near f g l p = {state:?} (µHz, kW) for which no law has an entry; use \
-         table.domain = \"winning\" to see which"
-    )]
-    LeavesTable {
-        /// The state, in micro-units.
-        state: [i32; STATES],
-    },
-    /// A table cannot be assembled.
-    #[error(transparent)]
-    Emit(#[from] EmitError),
-    /// A part is larger than the format holds.
-    #[error("a tree is larger than the format holds (16 MiB below one node)")]
-    TooLarge,
-}
-
 /// Compresses the laws of a synthesis.
 ///
 /// # Errors
 /// As [`CompressError`].
 pub fn compress<'w>(
-    spec: &Spec,
     synthesis: &Synthesis,
     options: &Options,
     watch: &dyn Fn(&'static str) -> Box<dyn Watch + 'w>,
 ) -> Result<CompressedLaws, CompressError> {
-    let abstraction = synthesis::abstraction(spec, &synthesis.grid)?;
+    let problem = &synthesis.problem;
+    let abstraction = synthesis::abstraction(problem).map_err(SynthesisError::from)?;
     let context = |options| Context {
-        spec,
-        grid: &synthesis.grid,
+        problem,
+        spec: &problem.spec,
         abstraction: &abstraction,
         options,
         watch,
     };
-    if spec.table.domain == spec::Domain::Reachable {
+    if problem.spec.table.domain == spec::Domain::Reachable {
         return context(options).reachable(synthesis);
     }
     let given_up = context(options);
@@ -198,25 +166,9 @@ pub fn compress<'w>(
     context(&exact).winning(synthesis)
 }
 
-/// The whole table of a synthesis, and how its laws came out.
-///
-/// # Errors
-/// As [`compress`], and numbers of the spec that the header cannot hold.
-pub fn table<'w>(
-    spec: &Spec,
-    synthesis: &Synthesis,
-    options: &Options,
-    watch: &dyn Fn(&'static str) -> Box<dyn Watch + 'w>,
-) -> Result<(Vec<u8>, CompressedLaws), CompressError> {
-    let laws = compress(spec, synthesis, options, watch)?;
-    let head = emit::head(spec, synthesis.grid)?;
-    let image = emit::assemble(head, &laws.encoded())?;
-    Ok((image, laws))
-}
-
 struct Context<'c, 'w> {
+    problem: &'c Problem,
     spec: &'c Spec,
-    grid: &'c Grid,
     abstraction: &'c AffineAbstraction<STATES>,
     options: &'c Options,
     watch: &'c dyn Fn(&'static str) -> Box<dyn Watch + 'w>,
@@ -225,20 +177,21 @@ struct Context<'c, 'w> {
 impl<'w> Context<'_, 'w> {
     /// Whether the closed loop from the spec's initial states finds an entry wherever it comes.
     fn covers_the_event(&self, laws: &CompressedLaws) -> Result<bool, CompressError> {
-        let image = emit::assemble(emit::head(self.spec, *self.grid)?, &laws.encoded())?;
+        let image = emit::assemble(emit::head(self.problem)?, &laws.encoded())?;
         let table = TableView::parse(&image).map_err(EmitError::Rejected)?;
-        match reachable::reachable(self.spec, self.abstraction, &table) {
+        match reachable::reachable(self.problem, self.abstraction, &table) {
             Ok(_) => Ok(true),
-            // Where the closed loop cannot be explored nobody can tell: then nothing is given up either.
+            // Where the closed loop cannot be explored nobody can tell: then nothing is given up
+            // either.
             Err(CompressError::LeavesTable { .. } | CompressError::Unbounded) => Ok(false),
             Err(error) => Err(error),
         }
     }
 
-    fn guard(&self, law: Law) -> Result<OptionalGuard, DelayError> {
+    fn guard(&self, law: Law) -> OptionalGuard {
         match law {
-            Law::Hold => synthesis::stay_guard(self.spec, self.grid),
-            Law::C1 | Law::C2 => synthesis::containment_guard(self.spec, self.grid),
+            Law::Hold => synthesis::stay_guard(self.problem),
+            Law::C1 | Law::C2 => synthesis::containment_guard(self.problem),
         }
     }
 
@@ -292,7 +245,7 @@ fn finish(
             domain_leaves: part.tree.leaves() as u32,
             half_spaces: part.predicates.spaces.len() as u32,
             entries: inputs.tree.leaves() as u32,
-            laws: inputs.laws.laws.len() as u32,
+            laws: inputs.laws.pieces.len() as u32,
             steps_minimal: worst(&solved.solution.ranks),
             steps: inputs.steps,
         },

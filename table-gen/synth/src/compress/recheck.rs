@@ -1,7 +1,9 @@
-//! The emitted bytes, checked again: do they answer where they must, and does the controller that they are still win?
+//! The emitted bytes, checked again: do they answer where they must, and does the controller that
+//! they are still win?
 //!
-//! This asks the firmware's reader for every cell of the grid; what the bytes were made from plays no part but for the
-//! targets of the games. (The verifier proves more, and from the spec alone; this check is cheap and names the cell.)
+//! This asks the firmware's reader for every cell of the grid; what the bytes were made from plays
+//! no part but for the targets of the games. (The verifier proves more, and from the spec alone;
+//! this check is cheap and names the cell.)
 
 use firmware::grid::Cell;
 use firmware::table::{Law, LawView, TableView};
@@ -47,8 +49,9 @@ pub struct Recheck {
     pub steps: u16,
 }
 
-/// Plays the game with the law's own answers, and C1's in its place where C2 has none. For C1 and C2 `target` is where it
-/// ends; Hold has none: every answer must keep all successors in the domain.
+/// Plays the game with the law's own answers, and C1's in its place where C2 has none. For C1 and
+/// C2 `target` is where it ends; Hold has none: every answer must keep all successors in the
+/// domain.
 ///
 /// # Errors
 /// A game without a result.
@@ -101,7 +104,7 @@ fn stays(
     domain: &BitSet,
     answer: &(dyn Fn(usize, [u32; STATES]) -> u32 + Sync),
 ) -> Result<Recheck, CompressError> {
-    use crate::game::guard::Guard;
+    use crate::abstraction::guard::Guard;
     use crate::game::inclusion::Inclusion;
     let shape = abstraction.shape();
     let inclusion = Inclusion::new(shape, domain, abstraction.extents());

@@ -2,8 +2,8 @@
 
 use firmware::grid::Cell;
 
-use super::cells::LabelledCell;
-use super::split::{Plane, best_plane, widest_plane};
+use super::best_plane::{Plane, best_plane, widest_plane};
+use super::cells::{LabelledCell, bounds};
 use model::plant::STATES;
 
 /// Cells from which on the two sides of a plane are built in parallel.
@@ -82,11 +82,13 @@ impl Tree {
     }
 }
 
-/// Which of the leaf values that fit all cells of a box it gets: the labels in common (not zero), and the cells.
+/// Which of the leaf values that fit all cells of a box it gets: the labels in common (not zero),
+/// and the cells.
 pub type ChooseLeaf<'c> = dyn Fn(u64, &[LabelledCell]) -> u8 + Sync + 'c;
 
-/// Builds a tree of at most `depth_max` nodes on any path that gives every cell one of its labels. Planes are chosen
-/// greedily ([`best_plane`] says what `balance` does); where the depth runs out boxes are halved, so the depth must be at least the sum of the axes' bits.
+/// Builds a tree of at most `depth_max` nodes on any path that gives every cell one of its labels.
+/// Planes are chosen greedily ([`best_plane`] says what `balance` does); where the depth runs out
+/// boxes are halved, so the depth must be at least the sum of the axes' bits.
 ///
 /// The order of the cells is lost. The result does not depend on it, nor on the number of threads.
 pub fn build(
@@ -126,18 +128,6 @@ pub fn build(
         left: Box::new(left),
         right: Box::new(right),
     }
-}
-
-/// Lowest and highest cell on each axis.
-pub(super) fn bounds(cells: &[LabelledCell]) -> ([u16; STATES], [u16; STATES]) {
-    let (mut low, mut high) = ([u16::MAX; STATES], [0u16; STATES]);
-    for cell in cells {
-        for d in 0..STATES {
-            low[d] = low[d].min(cell.cell[d]);
-            high[d] = high[d].max(cell.cell[d]);
-        }
-    }
-    (low, high)
 }
 
 /// Depth after which halving the widest axis has told all cells apart.

@@ -8,8 +8,8 @@ use firmware::table::{
 };
 use firmware::units::Band;
 
-use crate::delay::{self, Delay, DelayError};
-
+use crate::delay;
+use crate::problem::Problem;
 use model::spec::Spec;
 use model::table_fields::{self, FieldError};
 
@@ -49,9 +49,6 @@ pub enum EmitError {
     /// The same, for what the header says was assumed, and for a response.
     #[error(transparent)]
     Hypotheses(#[from] FieldError),
-    /// A delay that the device cannot predict over.
-    #[error(transparent)]
-    Delay(#[from] DelayError),
     /// The spec's laws come from games.
     #[error("preference.always_on is false: the laws come from games")]
     NotAlwaysOn,
@@ -63,18 +60,14 @@ pub enum EmitError {
     Rejected(TableError),
 }
 
-/// The head of a spec's table.
+/// The head of a problem's table.
 ///
 /// # Errors
 /// A number that does not fit its field.
-pub fn head(spec: &Spec, grid: Grid) -> Result<Head, EmitError> {
-    let delay = if spec.preference.always_on {
-        None
-    } else {
-        Delay::of(spec)?
-    };
+pub fn head(problem: &Problem) -> Result<Head, EmitError> {
+    let delay = problem.delay.as_ref();
     Ok(Head {
-        header: header(spec, grid)?,
+        header: header(&problem.spec, problem.grid)?,
         prediction: delay.map_or_else(Vec::new, |delay| delay.coefficients.bytes()),
     })
 }
@@ -126,8 +119,7 @@ fn generator() -> u32 {
 /// A spec whose laws come from games, or a number that does not fit its field.
 pub fn response(spec: &Spec, grid: Grid) -> Result<Vec<u8>, EmitError> {
     let law = table_fields::response(spec)?.ok_or(EmitError::NotAlwaysOn)?;
-    let head = head(spec, grid)?;
-    let mut image = table::write_header(&head.header).to_vec();
+    let mut image = table::write_header(&header(spec, grid)?).to_vec();
     image.extend_from_slice(&table::write_response(&law));
     finish(image)
 }

@@ -207,10 +207,11 @@ pub struct Filter<const D: usize> {
 }
 
 impl<const D: usize> Filter<D> {
-    /// A filter for a sweep against `set`. With `need_core` an input is passed over if the shared
-    /// part of the block's boxes is not in the set: right where a cell needs the whole box (reach),
-    /// and where a cell keeps an input only while the whole box is in (safety asks the opposite
-    /// question and does without).
+    /// A filter for a sweep against `set`.
+    ///
+    /// The boxes of a block's cells share a core. With `need_core`, an input is skipped for the
+    /// whole block if that core is not in the set. This is right in a reach game: there a cell
+    /// needs its whole box. A safety game asks which cells lose an input, and does without.
     pub fn new<A: Abstraction<D>>(
         abstraction: &A,
         set: &BitSet,

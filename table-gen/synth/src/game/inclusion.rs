@@ -1,9 +1,11 @@
-//! "Does a box of cells lie in the set?", answered in a few instructions, millions of times a sweep.
+//! "Does a box of cells lie in the set?", answered in a few instructions, millions of times a
+//! sweep.
 //!
-//! The boxes of an abstraction come in few sizes (on a uniform grid a fixed radius covers k or k + 1 cells of an axis).
-//! For each combination of sizes on the axes above the first, the set is eroded once; a box is then included exactly
-//! when a run of bits along the first axis is all ones in the eroded set. The first axis is not eroded, because its
-//! sizes vary most (the input acts there first) and a run of bits costs no more than one bit.
+//! The boxes of an abstraction come in few sizes (on a uniform grid a fixed radius covers k or k +
+//! 1 cells of an axis). For each combination of sizes on the axes above the first, the set is
+//! eroded once; a box is then included exactly when a run of bits along the first axis is all ones
+//! in the eroded set. The first axis is not eroded, because its sizes vary most (the input acts
+//! there first) and a run of bits costs no more than one bit.
 
 use rayon::prelude::*;
 
@@ -41,7 +43,8 @@ impl<const D: usize> Inclusion<D> {
         let mut sets = vec![set.clone()];
         if let Some(sizes) = sizes {
             for d in 1..D {
-                // Sets for the axes below d are complete; each becomes one set for every size on axis d.
+                // Sets for the axes below d are complete; each becomes one set for every size on
+                // axis d.
                 let count = sizes.max[d] - sizes.min[d] + 1;
                 sets = (0..count)
                     .into_par_iter()
@@ -63,7 +66,8 @@ impl<const D: usize> Inclusion<D> {
         }
     }
 
-    /// Whether every cell of the box is in the set. The box must lie in the grid, its sizes among those prepared.
+    /// Whether every cell of the box is in the set. The box must lie in the grid, its sizes among
+    /// those prepared.
     #[inline]
     pub fn includes(&self, cells: &CellBox<D>) -> bool {
         let mut at = cells.low[0] as usize;

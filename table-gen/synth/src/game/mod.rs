@@ -51,7 +51,6 @@ pub mod bitset;
 pub mod blocks;
 pub mod cells;
 pub mod exchange;
-pub mod guard;
 pub mod inclusion;
 pub mod inputs;
 pub mod ledger;

@@ -6,13 +6,13 @@ use super::bitset::BitSet;
 use super::blocks::{Blocks, Dirty, Filter};
 use super::cells::Marks;
 use super::exchange::{Alone, Exchange};
-use super::guard::Guard;
 use super::inclusion::Inclusion;
 use super::inputs::InputSet;
 use super::ledger::{FullLedger, Ledger, Ranks};
 use super::state::{State, read_head, write_head};
 use super::{GameError, SWEEPS_MAX, Solution, Sweep, Watch};
 use crate::abstraction::Abstraction;
+use crate::abstraction::guard::Guard;
 
 /// Solves: from every winning cell, whatever the successor within its box, `target` is reached and
 /// `avoid` never entered, and no input is used that `guard` forbids. Target cells have rank 0 and
@@ -172,6 +172,8 @@ fn play<const D: usize, A: Abstraction<D>, L: Ledger<A::Inputs>>(
         }
         sweeps += 1;
         ledger.prepare(sweeps);
+        // Before the first sweep the target is what changed: a box without a cell of it is not
+        // included.
         let dirty = Dirty::after(abstraction, &changed);
         drop(changed);
         let filter = Filter::new(abstraction, &won, dirty, true);

@@ -29,13 +29,13 @@ use super::bitset::BitSet;
 use super::blocks::Blocks;
 use super::cells::Cells;
 use super::exchange::Alone;
-use super::guard::Guard;
 use super::inclusion::Inclusion;
 use super::inputs::InputSet;
 use super::reach::{included, reach};
 use super::safety::stay_or_enter;
 use super::{GameError, NOT_WON, SWEEPS_MAX, Solution, Sweep, Watch};
 use crate::abstraction::Abstraction;
+use crate::abstraction::guard::Guard;
 
 /// Inputs and ranks towards one goal.
 #[derive(Debug, Clone, PartialEq, Eq)]

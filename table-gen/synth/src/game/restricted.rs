@@ -10,11 +10,11 @@
 use rayon::prelude::*;
 
 use super::bitset::BitSet;
-use super::guard::Guard;
 use super::inclusion::Inclusion;
 use super::reach::included;
 use super::{GameError, NOT_WON, SWEEPS_MAX, Solution, Sweep, Watch};
 use crate::abstraction::Abstraction;
+use crate::abstraction::guard::Guard;
 
 /// Cells that one task of a sweep handles.
 const CELLS_PER_TASK: usize = 4096;
@@ -31,8 +31,8 @@ pub struct Restricted<'g, const D: usize, A, G> {
     pub target: &'g BitSet,
     /// Cells outside domain and target count as lost.
     pub domain: &'g BitSet,
-    /// Cells that another controller decides: they keep to what was chosen for them, even as a last
-    /// resort.
+    /// Cells that another controller decides. Only the inputs that it chose count there, even where
+    /// no other input wins.
     pub settled: Option<&'g BitSet>,
     /// Forbids inputs.
     pub guard: &'g G,

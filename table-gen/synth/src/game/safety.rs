@@ -10,7 +10,6 @@ use super::bitset::BitSet;
 use super::blocks::{Blocks, Dirty, Filter};
 use super::cells::{Cells, Marks};
 use super::exchange::{Alone, Exchange};
-use super::guard::Guard;
 use super::inclusion::Inclusion;
 use super::inputs::InputSet;
 use super::ledger::{Remaining, Witnesses};
@@ -18,6 +17,7 @@ use super::reach::included;
 use super::state::{State, read_head, write_head};
 use super::{GameError, NOT_WON, SWEEPS_MAX, Solution, Sweep, Watch};
 use crate::abstraction::Abstraction;
+use crate::abstraction::guard::Guard;
 
 /// Solves: from every cell of the kernel, some input keeps every successor in the kernel; `safe` is
 /// where the kernel must lie, and no input is used that `guard` forbids. The masks of the solution

@@ -1,4 +1,5 @@
-//! What is in a table: levels, jumps between neighbours, visits, slices. Everything is asked of the firmware's reader.
+//! What is in a table: levels, jumps between neighbours, visits, slices. Everything is asked of the
+//! firmware's reader.
 
 pub mod slice;
 

@@ -21,7 +21,8 @@ pub struct Slice {
     pub level_count: u8,
 }
 
-/// Cuts a slice along the axes x and y through a cell; `None` if the axes are equal or past the fourth.
+/// Cuts a slice along the axes x and y through a cell; `None` if the axes are equal or past the
+/// fourth.
 pub fn cut(table: &TableView<'_>, law: Law, x: usize, y: usize, through: Cell) -> Option<Slice> {
     if x == y || x >= STATES || y >= STATES {
         return None;
@@ -45,7 +46,8 @@ pub fn cut(table: &TableView<'_>, law: Law, x: usize, y: usize, through: Cell) -
 }
 
 impl Slice {
-    /// One character a cell, the highest row first: 0 to 9 and then letters for the level, a dot outside.
+    /// One character a cell, the highest row first: 0 to 9 and then letters for the level, a dot
+    /// outside.
     pub fn ascii(&self) -> String {
         let mut out = String::new();
         for row in self.levels.iter().rev() {

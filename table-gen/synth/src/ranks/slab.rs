@@ -5,9 +5,9 @@ use std::ops::Range;
 use model::grid_shape::GridShape;
 
 use super::Part;
+use crate::abstraction::guard::Guard;
 use crate::abstraction::{Abstraction, BlockCore, BlockExtents, CellBox, Extents};
 use crate::game::blocks::Blocks;
-use crate::game::guard::Guard;
 
 /// A window of an abstraction, with cells of its own in it. Boxes are those of the whole grid; a
 /// box of an own cell always lies in the window.

@@ -98,7 +98,7 @@ pub fn examine(case: &Case, resolution: Resolution) -> Option<Found> {
     if f.magnitude() >= F_MOST_HZ || count <= number.steps_up(resolution.follow_s) {
         return None;
     }
-    let for_ever = for_ever::after(&event, memory);
+    let for_ever = for_ever::after(&event.samples, &event.past, memory);
     Some(Found {
         f: match for_ever {
             Some(after) if !moving => f.join(after),

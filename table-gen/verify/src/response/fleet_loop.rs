@@ -5,7 +5,7 @@
 
 use model::flow::{self, Flow, Vector};
 use model::interval::Interval;
-use model::plant::{GridPlant, STATES};
+use model::plant::{Plant, STATES};
 
 /// The always-on law in real numbers, as the device's integers give it.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -47,7 +47,7 @@ pub enum LossProfile {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PlantBand {
     /// Parameters that are known, and the fleet's power; the three below are not read from it.
-    pub known: GridPlant,
+    pub known: Plant,
     /// H \[GW s/Hz\].
     pub inertia: Interval,
     /// K = 1/R_eq \[GW/Hz\].
@@ -127,7 +127,7 @@ pub struct FleetLoop {
     /// Largest |K| \[GW/Hz\].
     pub gain_most: f64,
     /// The plant's known parameters.
-    pub known: GridPlant,
+    pub known: Plant,
     /// Largest rate of f before the event \[Hz/s\]: what the initial box allows without loss and
     /// fleet.
     pub rate_before: f64,
@@ -138,7 +138,7 @@ impl FleetLoop {
     pub fn new(plant: &PlantBand, law: Law, assumed: Assumed, step_s: f64) -> Self {
         let half_inverse = |h: Interval| Interval::point(0.5) / h;
         let inverse = half_inverse(plant.inertia);
-        let nominal = GridPlant {
+        let nominal = Plant {
             governor_gain: plant.governor_gain.mid(),
             damping: plant.damping.mid(),
             inertia: 0.5 / inverse.mid(),
@@ -213,7 +213,7 @@ impl FleetLoop {
 }
 
 /// The derivative of `x'` by K f: (0, 1/T_G, T_1 / (T_2 T_G), 0).
-fn gain_direction(plant: &GridPlant) -> Vector<STATES> {
+fn gain_direction(plant: &Plant) -> Vector<STATES> {
     let point = Interval::point;
     [
         Interval::ZERO,

@@ -11,8 +11,8 @@
 use model::interval::Interval;
 
 use super::adjoint::{Choice, Past, Step, choices};
-use super::event::{Event, Watched};
 use super::fleet_loop::FleetLoop;
+use super::watched::Watched;
 use super::window::{F_MOST_HZ, Sample, Samples, Window, meet};
 
 /// By how much R is widened where it did not reproduce itself, relative to its width and at least
@@ -22,17 +22,14 @@ const WIDEN_LEAST: f64 = 1e-5;
 /// Attempts.
 const ROUNDS: usize = 200;
 
-/// Bounds of f for ever, from the moment at which the event was followed last; nothing if none were
-/// found.
-pub(super) fn after(event: &Event<'_>, memory: usize) -> Option<Interval> {
-    let samples = &event.samples;
+/// Bounds of f for ever, from the end of what is known of an event; nothing if none were found.
+pub(super) fn after(samples: &Samples<'_>, past: &Past<'_>, memory: usize) -> Option<Interval> {
     let first = samples
         .samples
         .len()
         .checked_sub(memory + look_back(&samples.window))?;
     let sample = samples.samples.get(first..)?.iter().copied().reduce(join)?;
-    let state = event
-        .past
+    let state = past
         .states
         .get(first..)?
         .iter()

@@ -14,6 +14,7 @@
 //! | lines below and above the delivered participation | `lines` |
 //! | one functional, one sweep | `adjoint` |
 //! | the window of readings that act in a step | `window` |
+//! | what is bounded at every sample | `watched` |
 //! | from the event on | `event` |
 //! | for ever | `for_ever` |
 //! | what the spec's meter makes of f | `meter` |
@@ -31,6 +32,7 @@ mod plan;
 mod proof;
 #[cfg(test)]
 mod testing;
+mod watched;
 mod window;
 
 pub use cases::{Case, Found, Resolution, examine};

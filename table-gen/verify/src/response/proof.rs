@@ -7,7 +7,7 @@ use firmware::response::ResponseLaw;
 use firmware::table::{Hypotheses, LossProfile as Profile, TableView};
 use firmware::units::MICRO;
 use model::interval::Interval;
-use model::plant::GridPlant;
+use model::plant::Plant;
 use model::spec::Spec;
 use model::verdict::{Claim, ClaimName, Counts, Method};
 
@@ -125,9 +125,9 @@ fn case(law: &ResponseLaw, table: &TableView<'_>, spec: &Spec) -> Case {
     let initial = &spec.uncertainty.initial;
     let longer = (tick_most_s - tick_s).max(0.0) * f64::from(law.window_ticks);
     let loss = band(assumed.loss_kw);
-    let known = GridPlant {
+    let known = Plant {
         fleet: micro(header.plant.fleet_kw),
-        ..GridPlant::new(spec)
+        ..Plant::new(spec)
     };
     Case {
         plant: PlantBand {

@@ -2,7 +2,7 @@
 
 use super::fleet_loop::{Assumed, Law, LossProfile, PlantBand};
 use model::interval::Interval;
-use model::plant::GridPlant;
+use model::plant::Plant;
 
 /// P \[GW\].
 const FLEET_GW: f64 = 1.4;
@@ -40,7 +40,7 @@ pub(super) fn assumed() -> Assumed {
 }
 
 pub(super) fn plant() -> PlantBand {
-    let known = GridPlant {
+    let known = Plant {
         governor_gain: -5.0,
         governor_time: 2.5,
         turbine_time: 0.5,

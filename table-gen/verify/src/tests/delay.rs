@@ -1,5 +1,5 @@
-//! Commands that act with a delay: the device's prediction against an integration, the boxes of games
-//! and verifier against trajectories.
+//! Commands that act with a delay: the device's prediction against an integration, the boxes of
+//! games and verifier against trajectories.
 
 use firmware::prediction::{History, PredictionView};
 use firmware::table::{LAWS, TableView};
@@ -7,16 +7,19 @@ use firmware::units::State;
 
 use super::Random;
 use crate::closed_loop::Model;
+use crate::delayed_loop::closed_loop;
 use crate::successor::{index, successor};
 use model::interval::Interval;
-use model::plant::{GridPlant, STATES};
+use model::plant::{Plant, STATES};
 use model::spec::Spec;
 use synth::abstraction::Abstraction;
 use synth::delay::Delay;
 use synth::emit;
+use synth::problem::Problem;
 use synth::synthesis;
 
-/// A spec with Hold, a delay of half a period, and a little of every other uncertainty, on a grid of 492,480 cells.
+/// A spec with Hold, a delay of half a period, and a little of every other uncertainty, on a grid
+/// of 492,480 cells.
 const DELAYED: [&str; 9] = [
     "name=delayed",
     "grid={lower=[-0.9,-0.4,-0.2,-0.2],upper=[0.3,3.4,2.2,2.2],width=[0.02,0.2,0.1,0.1],alignment=\"edges\"}",
@@ -40,9 +43,8 @@ fn delayed(more: &[&str]) -> Spec {
 
 /// A table of head and no laws.
 fn bare(spec: &Spec) -> Vec<u8> {
-    let grid = synthesis::device_grid(spec).unwrap();
     let none: [Option<emit::EncodedLaw>; LAWS] = [None, None, None];
-    emit::assemble(emit::head(spec, grid).unwrap(), &none).unwrap()
+    emit::assemble(emit::head(&Problem::new(spec).unwrap()).unwrap(), &none).unwrap()
 }
 
 /// In [-1, 1], an end half of the time.
@@ -59,9 +61,10 @@ fn level(random: &mut Random, spec: &Spec) -> u8 {
     ((0.5 + 0.5 * extreme(random)) * last).round() as u8
 }
 
-/// The plant over a tick by fourth-order Runge-Kutta steps of at most 2 ms, states and power in micro-units. The fastest mode is 2/s, so a step
-/// errs by (0.004)^5 / 120, relatively, and 6.4 s by less than 1e-10: below a thousandth of a micro-unit for states of a few units.
-fn fly(plant: &GridPlant, mut x: [f64; STATES], power: f64, tick_s: f64) -> [f64; STATES] {
+/// The plant over a tick by fourth-order Runge-Kutta steps of at most 2 ms, states and power in
+/// micro-units. The fastest mode is 2/s, so a step errs by (0.004)^5 / 120, relatively, and 6.4 s
+/// by less than 1e-10: below a thousandth of a micro-unit for states of a few units.
+fn fly(plant: &Plant, mut x: [f64; STATES], power: f64, tick_s: f64) -> [f64; STATES] {
     let steps = (tick_s / 0.002).ceil();
     let h = tick_s / steps;
     for _ in 0..steps as u32 {
@@ -114,12 +117,13 @@ fn a_prediction_is_within_its_bound_of_an_integration() {
         let view = TableView::parse(&bytes).unwrap();
         let prediction = view.prediction().unwrap();
         assert_eq!(prediction.ticks() as u32, delay.ticks);
-        let plant = GridPlant::new(&spec);
+        let plant = Plant::new(&spec);
         let tick_s = f64::from(spec.sampling.watch_ms()) / 1000.0;
         let fleet = spec.fleet_power_gw() * 1e6;
         let [low, high] = spec.uncertainty.loss_gw;
         let loss = 0.5 * (low + high) * 1e6;
-        // A few micro-units: nothing beside a cell. Most of it is a micro-unit of f that becomes K kW of g.
+        // A few micro-units: nothing beside a cell. Most of it is a micro-unit of f that becomes K
+        // kW of g.
         assert!(
             delay.rounding.iter().all(|rho| *rho < 40.0),
             "{:?}",
@@ -157,7 +161,7 @@ fn a_prediction_is_within_its_bound_of_an_integration() {
 /// A loop in mid-event: the real plant, the commands under way, and what the device knows.
 struct Loop<'t> {
     spec: &'t Spec,
-    plant: GridPlant,
+    plant: Plant,
     prediction: PredictionView<'t>,
     history: History,
     /// Levels under way, the oldest first.
@@ -205,18 +209,19 @@ fn no_trajectory_leaves_the_boxes_of_games_and_verifier() {
         let view = TableView::parse(&bytes).unwrap();
         let grid = view.header().grid;
         let delay = Delay::of(&spec).unwrap().unwrap();
-        let abstraction = synthesis::abstraction(&spec, &grid).unwrap();
-        let model = Model::new(&view, &spec);
-        assert_eq!(model.knowledge.limit, None);
+        let abstraction = synthesis::abstraction(&Problem::new(&spec).unwrap()).unwrap();
+        let model = closed_loop(&view, &spec);
+        assert_eq!(model.known.limit, None);
         let tick_s = f64::from(spec.sampling.watch_ms()) / 1000.0;
         let (ticks, period) = (delay.ticks, spec.sampling.ticks_per_period());
         let (mut checked, mut most) = (0u32, [0.0f64; STATES]);
         for trial in 0..400 {
-            // From a state and a past that an adversary prefers: the same extremes for long, or changing ones.
+            // From a state and a past that an adversary prefers: the same extremes for long, or
+            // changing ones.
             let pace = 100f64.powf(random.unit());
             let mut real = Loop {
                 spec: &spec,
-                plant: GridPlant::new(&spec),
+                plant: Plant::new(&spec),
                 prediction: view.prediction().unwrap(),
                 history: History::NONE,
                 under_way: (0..ticks).map(|_| 0).collect(),
@@ -245,7 +250,8 @@ fn no_trajectory_leaves_the_boxes_of_games_and_verifier() {
             } else {
                 level(&mut random, &spec)
             };
-            // When the command begins to act the real state is within E'; a period after the decision the next one is made.
+            // When the command begins to act the real state is within E'; a period after the
+            // decision the next one is made.
             let mut decided_on = None;
             for tick in 0..ticks.max(period) {
                 if tick == ticks {
@@ -264,10 +270,10 @@ fn no_trajectory_leaves_the_boxes_of_games_and_verifier() {
             let at = cell.0.map(u32::from);
             let bounds = grid.bounds(cell).unwrap();
             let from = std::array::from_fn(|d| Interval {
-                low: f64::from(bounds[d].0) - model.knowledge.before[d],
-                high: f64::from(bounds[d].1) + model.knowledge.before[d],
+                low: f64::from(bounds[d].0) - model.known.before[d],
+                high: f64::from(bounds[d].1) + model.known.before[d],
             });
-            let drift = &model.knowledge.drifts[usize::from(level)];
+            let drift = &model.known.drifts[usize::from(level)];
             let verifiers = successor(&grid, &model, &from, drift);
             let games = abstraction.successor(&abstraction.anchor(at), level.into());
             for d in 0..STATES {
@@ -291,7 +297,8 @@ fn no_trajectory_leaves_the_boxes_of_games_and_verifier() {
             }
             checked += u32::from(verifiers.is_some() && games.is_some());
             if let (Some(a), Some(b)) = (&verifiers, &games) {
-                // Two derivations of one box: they may differ by rounding at an edge, and by the growth bound.
+                // Two derivations of one box: they may differ by rounding at an edge, and by the
+                // growth bound.
                 for d in 0..STATES {
                     let (low, high) = (u32::from(a.low[d]), u32::from(a.high[d]));
                     assert!(b.low[d] <= low + 1 && b.high[d] + 1 >= high, "{a:?} {b:?}");
@@ -320,7 +327,7 @@ fn check_effective(
     for d in 0..STATES {
         // The stored prediction is a floor.
         let off = (real.x[d] - f64::from(known.0[d]) - 0.5).abs() - 0.5;
-        for bound in [delay.effective[d], model.knowledge.real[d]] {
+        for bound in [delay.effective[d], model.known.real[d]] {
             assert!(off <= bound + 0.01, "axis {d}: {off} of {bound}");
             most[d] = most[d].max(off / bound);
         }

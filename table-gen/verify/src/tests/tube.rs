@@ -1,21 +1,22 @@
 //! The bound of f between the samples, held against real trajectories.
 
 use super::Random;
-use crate::closed_loop::Drive;
-use crate::segment::Segment;
+use crate::drive::Drive;
+use crate::held_input::HeldInput;
 use model::interval::Interval;
-use model::plant::{GridPlant, STATES};
+use model::plant::{Plant, STATES};
 use model::spec::Spec;
 use proptest::prelude::*;
 
-/// Steps of the integrator in a period: RK4 at 1 ms errs by about h^4 per second, 1e-12 relative here.
+/// Steps of the integrator in a period: RK4 at 1 ms errs by about h^4 per second, 1e-12 relative
+/// here.
 const STEPS: u32 = 1500;
 
-fn derivative(plant: &GridPlant, x: &[f64; STATES], v: f64) -> [f64; STATES] {
+fn derivative(plant: &Plant, x: &[f64; STATES], v: f64) -> [f64; STATES] {
     plant.derivative(*x, v)
 }
 
-fn runge_kutta(plant: &GridPlant, x: &[f64; STATES], v: f64, h: f64) -> [f64; STATES] {
+fn runge_kutta(plant: &Plant, x: &[f64; STATES], v: f64, h: f64) -> [f64; STATES] {
     let at = |k: &[f64; STATES], f: f64| std::array::from_fn(|d| x[d] + f * k[d]);
     let k1 = derivative(plant, x, v);
     let k2 = derivative(plant, &at(&k1, h / 2.0), v);
@@ -27,8 +28,9 @@ fn runge_kutta(plant: &GridPlant, x: &[f64; STATES], v: f64, h: f64) -> [f64; ST
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(64))]
 
-    /// Trajectories from points of a box under a drive that switches at random stay within the bound, at 1500 times of
-    /// the period; and the bound is not loose: with nothing uncertain it is within 50 µHz of the extremes seen.
+    /// Trajectories from points of a box under a drive that switches at random stay within the
+    /// bound, at 1500 times of the period; and the bound is not loose: with nothing uncertain it is
+    /// within 50 µHz of the extremes seen.
     #[test]
     fn real_trajectories_stay_within_the_tube(
         corner in proptest::array::uniform4(-1.0f64..1.0),
@@ -37,9 +39,9 @@ proptest! {
         radius in prop_oneof![Just(0.0), 0.0f64..300_000.0],
         seed in 0u64..1000,
     ) {
-        let plant = GridPlant::new(&Spec::load("paper-bi", &[]).unwrap());
+        let plant = Plant::new(&Spec::load("paper-bi", &[]).unwrap());
         let (a, b) = plant.matrices();
-        let segment = Segment::new(&a, &b, 1.5);
+        let segment = HeldInput::new(&a, &b, 1.5);
         // States of up to 1 Hz and 3 GW, in micro-units.
         let scale = [1e6, 3e6, 2e6, 2e6];
         let set: [Interval; STATES] = std::array::from_fn(|d| {

@@ -7,7 +7,7 @@ use firmware::fault::Mode;
 use firmware::link::session::Session;
 use firmware::link::{Request, Response, Setup};
 use firmware::table::PlantParameters;
-use model::plant::GridPlant;
+use model::plant::Plant;
 use model::propagator::Propagator;
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
@@ -110,10 +110,10 @@ impl Outcome {
 }
 
 /// The paper's plant with a fleet of this power.
-pub fn plant(fleet_gw: f64) -> GridPlant {
+pub fn plant(fleet_gw: f64) -> Plant {
     let micro = |value: u32| f64::from(value) * 1e-6;
     let table = PlantParameters::PAPER;
-    GridPlant {
+    Plant {
         governor_gain: f64::from(table.governor_gain_kw_per_hz) * 1e-6,
         governor_time: micro(table.governor_time_us),
         turbine_time: micro(table.turbine_time_us),

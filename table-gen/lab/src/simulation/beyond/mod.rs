@@ -1,19 +1,21 @@
-//! A plant that is wrong in other ways than the spec says: for testing the controller where the model fails.
+//! A plant that is wrong in other ways than the spec says: for testing the controller where the
+//! model fails.
 //!
-//! Losses in stages, a second loss during recovery, inertia that is lost with the infeed, governors with a dead band, a
-//! limited rate and a limited output, and noise of the demand. None of this is linear; it exists in the simulation only,
-//! and [`Disturbances::outside_proof`] says which of it the proof does not cover.
+//! Losses in stages, a second loss during recovery, inertia that is lost with the infeed, governors
+//! with a dead band, a limited rate and a limited output, and noise of the demand. None of this is
+//! linear; it exists in the simulation only, and [`Disturbances::outside_proof`] says which of it
+//! the proof does not cover.
 //!
 //! | module | holds |
 //! |---|---|
 //! | [`mod@file`] | the scenario file |
 //! | [`plant`] | the equations |
-//! | [`grid`] | the same in time, for the firmware's loop |
+//! | [`system`] | the same in time, for the firmware's loop |
 
 pub mod file;
-pub mod grid;
 pub mod noise;
 pub mod plant;
+pub mod system;
 
 use model::spec::Spec;
 

@@ -8,7 +8,8 @@ use crate::simulation::chance::unit;
 
 /// The noise holds its value for this long \[s\].
 pub(super) const HOLD_S: f64 = 0.1;
-/// Stream of the generator, so that the noise shares no draw with the other errors of the same seed.
+/// Stream of the generator, so that the noise shares no draw with the other errors of the same
+/// seed.
 const STREAM: u64 = 0xDE3A_4D00;
 
 /// Values of the noise \[GW\], one each [`HOLD_S`].
@@ -18,8 +19,8 @@ pub(super) struct Noise {
 }
 
 impl Noise {
-    /// The exact discrete process: `n⁺ = a n + σ √(1 - a²) ξ` with `a = exp(-HOLD_S / time)` and standard normal ξ, from its
-    /// stationary law.
+    /// The exact discrete process: `n⁺ = a n + σ √(1 - a²) ξ` with `a = exp(-HOLD_S / time)` and
+    /// standard normal ξ, from its stationary law.
     pub(super) fn new(noise: &DemandNoise, duration_s: f64, seed: u64) -> Self {
         if noise.deviation_gw == 0.0 {
             return Self { values: Vec::new() };
@@ -71,11 +72,12 @@ mod tests {
         let mean = noise.values.iter().sum::<f64>() / n;
         let variance = noise.values.iter().map(|v| v * v).sum::<f64>() / n;
         let pairs = noise.values.windows(2).map(|w| w[0] * w[1]).sum::<f64>();
-        // 100,000 s / (2 x 2 s) = 25,000 independent values: the mean's standard error is 0.05 / 158 = 3.2e-4, the
-        // variance's relative one sqrt(2 / 25,000) = 0.9 %; four of each.
+        // 100,000 s / (2 x 2 s) = 25,000 independent values: the mean's standard error is 0.05 /
+        // 158 = 3.2e-4, the variance's relative one sqrt(2 / 25,000) = 0.9 %; four of each.
         assert!(mean.abs() < 1.3e-3, "{mean}");
         assert!((variance / 0.0025 - 1.0).abs() < 0.036, "{variance}");
-        // Correlation over one step: exp(-0.05), with a standard error of sqrt((1 - a²) / n) = 3e-4; four.
+        // Correlation over one step: exp(-0.05), with a standard error of sqrt((1 - a²) / n) =
+        // 3e-4; four.
         let kept = pairs / (n - 1.0) / variance;
         assert!((kept - (-0.05f64).exp()).abs() < 1.3e-3, "{kept}");
     }

@@ -5,17 +5,17 @@
 //! l' = (g + T_1 g' - l) / T_2                     p' = (l - p) / T_t
 //! ```
 //!
-//! with z(f) the deviation past the governors' dead band. Integrated by the classical Runge-Kutta method, with a step's
-//! end on every jump of w, n and H.
+//! with z(f) the deviation past the governors' dead band. Integrated by the classical Runge-Kutta
+//! method, with a step's end on every jump of w, n and H.
 
 use super::noise::{HOLD_S, Noise};
 use super::{Disturbances, Governor, Loss};
-use model::plant::{GridPlant, STATES};
+use model::plant::{Plant, STATES};
 
 /// A plant with its disturbances of one run.
 #[derive(Debug, Clone)]
 pub struct BeyondPlant {
-    plant: GridPlant,
+    plant: Plant,
     governor: Governor,
     /// Moments of the losses \[s\], in order.
     jumps_s: Vec<f64>,
@@ -35,7 +35,7 @@ pub struct Drive {
 
 impl BeyondPlant {
     /// The plant under disturbances that last for at least `duration_s`.
-    pub fn new(plant: GridPlant, disturbances: &Disturbances, duration_s: f64, seed: u64) -> Self {
+    pub fn new(plant: Plant, disturbances: &Disturbances, duration_s: f64, seed: u64) -> Self {
         let mut lost = vec![Loss {
             at_s: f64::NEG_INFINITY,
             power_gw: 0.0,

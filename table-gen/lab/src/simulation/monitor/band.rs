@@ -2,7 +2,7 @@
 //!
 //! A start above the band is no departure: the event is a fall.
 
-use super::segment::Segment;
+use super::arc::Arc;
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Place {
@@ -42,7 +42,7 @@ impl BandWatch {
 
     /// Takes a segment whose curve lies within `hull`.
     #[inline]
-    pub(super) fn segment(&mut self, segment: &Segment, hull: (f64, f64)) {
+    pub(super) fn segment(&mut self, segment: &Arc, hull: (f64, f64)) {
         let (lowest, highest) = hull;
         if self.place(lowest) == self.place(highest) {
             self.stretch(self.place(lowest), segment.from.time_s);

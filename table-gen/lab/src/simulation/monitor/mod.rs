@@ -1,18 +1,19 @@
 //! What a run is judged by: one meter fed with segments of the frequency, whoever drives the plant.
 //!
-//! A segment is the cubic Hermite curve through frequency and slope at its two ends. Its distance from the true curve is
-//! at most `h⁴ max|f''''| / 384`; with |f''''| below 1 Hz/s⁴ for this plant that is 3e-7 Hz at h = 0.1 s.
+//! A segment is the cubic Hermite curve through frequency and slope at its two ends. Its distance
+//! from the true curve is at most `h⁴ max|f''''| / 384`; with |f''''| below 1 Hz/s⁴ for this plant
+//! that is 3e-7 Hz at h = 0.1 s.
 
+mod arc;
 mod band;
-mod segment;
 
 use serde::Serialize;
 
 use super::NOMINAL_HZ;
+use arc::Arc;
+pub use arc::Knot;
 use band::BandWatch;
 use model::spec::Spec;
-pub use segment::Knot;
-use segment::Segment;
 
 /// Statutory lower limit \[Hz, deviation\].
 pub const STATUTORY_LOW_HZ: f64 = -0.5;
@@ -34,7 +35,8 @@ pub struct Summary {
     pub containment_breached: Option<bool>,
     /// When f first left I1 \[s\]; `null` if it never did.
     pub left_outer_s: Option<f64>,
-    /// When f first came back into I1 after leaving it \[s\]; `null` if it never left or never came back.
+    /// When f first came back into I1 after leaving it \[s\]; `null` if it never left or never came
+    /// back.
     pub entered_outer_s: Option<f64>,
     /// When f first came back into I2 after leaving it \[s\].
     pub entered_inner_s: Option<f64>,
@@ -42,7 +44,8 @@ pub struct Summary {
     pub stayed_in_inner: bool,
     /// Whether the run satisfies ψ (see [`Monitor::satisfies_psi`]).
     pub satisfies_psi: bool,
-    /// Time in which no law of the table covered the state and the firmware fell back to the droop \[s\].
+    /// Time in which no law of the table covered the state and the firmware fell back to the droop
+    /// \[s\].
     pub fallback_s: f64,
 }
 
@@ -91,7 +94,8 @@ impl Monitor {
         self.fallback_s += time_s;
     }
 
-    /// Takes the next knot of a curve without jumps in its slope; knots must come in the order of time.
+    /// Takes the next knot of a curve without jumps in its slope; knots must come in the order of
+    /// time.
     pub fn knot(&mut self, knot: Knot) {
         match self.last {
             Some(from) => self.segment(from, knot),
@@ -104,14 +108,15 @@ impl Monitor {
         self.last = Some(knot);
     }
 
-    /// Takes the next piece of the curve, which starts where the last one ended, perhaps with another slope.
+    /// Takes the next piece of the curve, which starts where the last one ended, perhaps with
+    /// another slope.
     #[inline]
     pub fn segment(&mut self, from: Knot, to: Knot) {
         if self.last.is_none() {
             self.start(from);
         }
         self.last = Some(to);
-        let segment = Segment { from, to };
+        let segment = Arc { from, to };
         let hull = segment.hull();
         if hull.0 < self.nadir.0 {
             self.deepen(&segment);
@@ -130,7 +135,7 @@ impl Monitor {
     }
 
     /// Looks for a new nadir on a segment.
-    fn deepen(&mut self, segment: &Segment) {
+    fn deepen(&mut self, segment: &Arc) {
         let turns = segment.extremes().into_iter().flatten();
         for share in turns {
             let f = segment.at(share);
@@ -143,9 +148,9 @@ impl Monitor {
         }
     }
 
-    /// Whether the run so far satisfies ψ, the paper's equation 4 over the simulated time: f never below the containment;
-    /// I1, once left, entered again; I2, once left, entered again, and within `settle_within_s` of leaving I1 (ψ3); with
-    /// `stay`, I2 not left again.
+    /// Whether the run so far satisfies ψ, the paper's equation 4 over the simulated time: f never
+    /// below the containment; I1, once left, entered again; I2, once left, entered again, and
+    /// within `settle_within_s` of leaving I1 (ψ3); with `stay`, I2 not left again.
     pub fn satisfies_psi(&self) -> bool {
         let contained = self
             .containment_hz

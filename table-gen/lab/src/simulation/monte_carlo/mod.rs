@@ -1,7 +1,8 @@
 //! Many runs of the closed loop, each from its own seed.
 //!
-//! Run i of N has the seed `first + i`, and everything in a run follows from its seed. So the result does not depend on the
-//! number of threads, and any run can be looked at again: `simulate SPEC --runs 1 --seed S`.
+//! Run i of N has the seed `first + i`, and everything in a run follows from its seed. So the
+//! result does not depend on the number of threads, and any run can be looked at again: `simulate
+//! SPEC --runs 1 --seed S`.
 
 pub mod draws;
 pub mod statistics;
@@ -85,8 +86,8 @@ pub struct Statistics {
     pub worst: KeptRun,
 }
 
-/// Runs the loop `runs` times, at least once, with the seeds from `seed` on. `done` is told of each run and answers
-/// whether to go on; `None` if it said no.
+/// Runs the loop `runs` times, at least once, with the seeds from `seed` on. `done` is told of each
+/// run and answers whether to go on; `None` if it said no.
 pub fn run(
     closed_loop: &ClosedLoop<'_>,
     draws: &Draws,

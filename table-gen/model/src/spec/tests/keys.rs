@@ -5,7 +5,8 @@ use std::collections::BTreeSet;
 use super::super::*;
 use super::{leaves, refused};
 
-/// TOML text of `bad` where `doc` takes a number, the other elements of an array taken from the default.
+/// TOML text of `bad` where `doc` takes a number, the other elements of an array taken from the
+/// default.
 fn with_bad_element(doc: &KeyDoc, bad: &str, element: usize) -> String {
     match doc.allowed {
         Allowed::OptionalNumbers { len, .. } => {
@@ -24,7 +25,8 @@ fn with_bad_element(doc: &KeyDoc, bad: &str, element: usize) -> String {
     }
 }
 
-/// Numbers just outside what a key allows, as TOML writes them; empty where the key takes no number.
+/// Numbers just outside what a key allows, as TOML writes them; empty where the key takes no
+/// number.
 fn bad_numbers(doc: &KeyDoc) -> Vec<String> {
     let range = match doc.allowed {
         Allowed::Number(range)
@@ -72,7 +74,7 @@ fn the_key_table_and_the_structs_have_the_same_keys() {
     let text = toml::to_string(&spec).unwrap();
     let listed: BTreeSet<String> = reference().iter().map(|doc| doc.key.to_owned()).collect();
     let mut printed = leaves(&toml::from_str(&text).unwrap());
-    printed.insert(super::super::formula::KEY.to_owned());
+    printed.insert(super::super::keys::FORMULA.to_owned());
     assert_eq!(printed, listed);
     assert_eq!(Spec::from_toml(&text, "printed", &[]).unwrap(), spec);
 }

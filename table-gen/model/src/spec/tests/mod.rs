@@ -1,4 +1,5 @@
-//! The spec from outside: shipped specs and overrides here, then every key in turn, then relations between keys.
+//! The spec from outside: shipped specs and overrides here, then every key in turn, then relations
+//! between keys.
 
 use std::collections::BTreeSet;
 
@@ -134,7 +135,7 @@ fn shipped_specs_state_every_key() {
             .map(|doc| doc.key.to_owned())
             // The laboratory's cars are ideal unless a spec says otherwise.
             .filter(|key| !key.starts_with("charger."))
-            .filter(|key| key != super::formula::KEY && (is_response || !only_of_responses(key)))
+            .filter(|key| key != super::keys::FORMULA && (is_response || !only_of_responses(key)))
             .collect();
         stated.retain(|key| !key.ends_with("_per_hz") || !key.starts_with("uncertainty."));
         assert_eq!(stated, all, "{name}");

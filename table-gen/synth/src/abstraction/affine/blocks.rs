@@ -1,52 +1,21 @@
-//! Blocks and groups of neighbouring cells of an affine abstraction, and the boxes that answer for all their cells.
+//! Blocks and groups of neighbouring cells of an affine abstraction, and the boxes that answer for
+//! all their cells.
 //!
-//! Over a block the table sums move by at most their travel, so the successors of all its cells under one input lie in
-//! the first cell's box widened by the travel (the *hull*), and what is left of a box when the travel is taken off at
-//! both ends lies in every one of them (the *core*).
+//! Over a block the table sums move by at most their travel, so the successors of all its cells
+//! under one input lie in the first cell's box widened by the travel (the *hull*), and what is left
+//! of a box when the travel is taken off at both ends lies in every one of them (the *core*).
 
+use super::block_tables::Travel;
 use super::{AffineAbstraction, AffineAnchor, FRACTION_BITS, Mode, ONE};
 use crate::abstraction::{BlockCore, BlockExtents, CellBox};
 
 /// Most cells of a block with a core.
 const BLOCK_CELLS_MAX: u32 = 64;
-/// A block of fewer cells is grown on as long as any core is left, or else without one: asking for the core and the hull
-/// of one or two cells costs as much as asking for their boxes.
+/// A block of fewer cells is grown on as long as any core is left, or else without one: asking for
+/// the core and the hull of one or two cells costs as much as asking for their boxes.
 const BLOCK_CELLS_MIN: u32 = 8;
 /// Most cells of a group.
 const GROUP_CELLS_MAX: u32 = 512;
-
-/// Shapes of blocks and groups, and what their boxes are computed from.
-#[derive(Debug, Clone)]
-pub(super) struct BlockTables<const D: usize> {
-    pub(super) block: [u32; D],
-    pub(super) group: [u32; D],
-    pub(super) extents: BlockExtents<D>,
-    /// Travel over a group in the first mode.
-    pub(super) group_travel: Travel<D>,
-    /// Lowest offset and highest end (offset plus span) over all inputs; meaningful with one mode.
-    ends_of_all: [(i64, i64); D],
-}
-
-/// Lowest (not above zero) and highest (not below zero) change of the table sums on each axis.
-pub(super) type Travel<const D: usize> = [(i64, i64); D];
-
-impl<const D: usize> BlockTables<D> {
-    /// Blocks and groups of one cell, until others are chosen.
-    pub(super) fn single() -> Self {
-        Self {
-            block: [1; D],
-            group: [1; D],
-            extents: BlockExtents {
-                core: None,
-                hull: [1; D],
-                hull_of_all: [1; D],
-                group: [1; D],
-            },
-            group_travel: [(0, 0); D],
-            ends_of_all: [(0, 0); D],
-        }
-    }
-}
 
 impl<const D: usize> AffineAbstraction<D> {
     /// Chooses blocks and groups and prepares their boxes.
@@ -56,8 +25,8 @@ impl<const D: usize> AffineAbstraction<D> {
             let high = self.steps.iter().map(|s| s.offset[d] + s.span[d]).max();
             self.blocks.ends_of_all[d] = (low.unwrap_or(0), high.unwrap_or(0));
         }
-        // All cells of a block share part of their boxes under every input, if possible half a cell: a block whose shared
-        // part is not won needs no look at its cells.
+        // All cells of a block share part of their boxes under every input, if possible half a
+        // cell: a block whose shared part is not won needs no look at its cells.
         let mut block = [1; D];
         for (cells_max, least) in [(BLOCK_CELLS_MAX, 0.5), (BLOCK_CELLS_MIN, 0.0)] {
             block = self.grow(block, cells_max, |block| {
@@ -80,7 +49,8 @@ impl<const D: usize> AffineAbstraction<D> {
         self.blocks.extents = self.block_extents_of(group);
     }
 
-    /// Doubles the block along the axis of least cost until it would hold more than so many cells or no axis has a cost.
+    /// Doubles the block along the axis of least cost until it would hold more than so many cells
+    /// or no axis has a cost.
     fn grow(
         &self,
         mut block: [u32; D],
@@ -136,7 +106,8 @@ impl<const D: usize> AffineAbstraction<D> {
         }
     }
 
-    /// Cells on each axis of a hull over all inputs. Modes differ in their tables: with more than one it is the grid.
+    /// Cells on each axis of a hull over all inputs. Modes differ in their tables: with more than
+    /// one it is the grid.
     fn size_of_all(&self, travel: &Travel<D>) -> [u32; D] {
         let count = self.shape.count;
         if self.modes.len() > 1 {
@@ -149,7 +120,8 @@ impl<const D: usize> AffineAbstraction<D> {
         })
     }
 
-    /// Smallest extent, in cells, of the part that the boxes of a block of this shape share; negative if none.
+    /// Smallest extent, in cells, of the part that the boxes of a block of this shape share;
+    /// negative if none.
     fn core_margin(&self, block: [u32; D]) -> f64 {
         let mut margin = f64::INFINITY;
         for step in &self.steps {
@@ -164,7 +136,7 @@ impl<const D: usize> AffineAbstraction<D> {
 
     /// Volume, in cells, of the largest hull of one input over a block of this shape.
     fn hull_volume(&self, block: [u32; D]) -> f64 {
-        let volume = |step: &super::Step<D>| -> f64 {
+        let volume = |step: &super::InputStep<D>| -> f64 {
             let travel = self.modes[step.mode].travel_over(block);
             (0..D)
                 .map(|d| (step.span[d] + travel[d].1 - travel[d].0) as f64 / ONE + 1.0)
@@ -184,7 +156,8 @@ impl<const D: usize> AffineAbstraction<D> {
             .product()
     }
 
-    /// A range of cells on an axis, moved into the grid and widened to a fixed size; `None` if it misses the grid.
+    /// A range of cells on an axis, moved into the grid and widened to a fixed size; `None` if it
+    /// misses the grid.
     #[inline]
     fn clipped(&self, axis: usize, (lowest, highest): (i64, i64), size: u32) -> Option<(u32, u32)> {
         let count = i64::from(self.shape.count[axis]);
@@ -254,8 +227,8 @@ impl<const D: usize> AffineAbstraction<D> {
         let (mut low, mut high) = ([0u32; D], [0u32; D]);
         let mut inside = true;
         for d in 0..D {
-            // Every box of the block starts at or below the first's start plus the travel upwards, and is that much longer
-            // than the core.
+            // Every box of the block starts at or below the first's start plus the travel upwards,
+            // and is that much longer than the core.
             let (_, up) = self.modes[step.mode].travel[d];
             let from = (sums[d] + step.offset[d] + up) >> FRACTION_BITS;
             let to = from + i64::from(extent[d]) - 1;
@@ -272,8 +245,8 @@ impl<const D: usize> AffineAbstraction<D> {
 }
 
 impl<const D: usize> Mode<D> {
-    /// Range of the table sums over a block, relative to the block's first cell. A block that the grid cuts short moves
-    /// less; the entries' own rounding is covered by two units an axis.
+    /// Range of the table sums over a block, relative to the block's first cell. A block that the
+    /// grid cuts short moves less; the entries' own rounding is covered by two units an axis.
     fn travel_over(&self, block: [u32; D]) -> Travel<D> {
         let mut travel = [(0i64, 0i64); D];
         for d in 0..D {
@@ -283,8 +256,8 @@ impl<const D: usize> Mode<D> {
                 if steps == 0 {
                     continue;
                 }
-                // Entries are multiples of one slope, each rounded by half a unit and a little: the change between any
-                // two differs from the slope's by less than two units.
+                // Entries are multiples of one slope, each rounded by half a unit and a little: the
+                // change between any two differs from the slope's by less than two units.
                 let change = table[steps as usize] - table[0];
                 travel[d].0 += change.min(0) - 2;
                 travel[d].1 += change.max(0) + 2;
@@ -314,8 +287,8 @@ mod tests {
 
     proptest! {
         #![proptest_config(ProptestConfig::with_cases(64))]
-        /// Over every group and block of random plants, every pair's box lies in the hulls, contains the core, and the
-        /// boxes have the sizes that the erosions are made for.
+        /// Over every group and block of random plants, every pair's box lies in the hulls,
+        /// contains the core, and the boxes have the sizes that the erosions are made for.
         #[test]
         fn hulls_enclose_and_cores_are_shared(
             a in proptest::array::uniform3(proptest::array::uniform3(-1.0f64..1.0)),

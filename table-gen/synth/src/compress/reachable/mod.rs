@@ -1,15 +1,20 @@
 //! Which cells does the closed loop ask the table for?
 //!
-//! The answer only chooses what a table covers. It is not part of the proof: a cell that the device asks for and that was
-//! left out is answered by "outside", and the verifier reports it. So plain arithmetic will do here.
+//! The answer only chooses what a table covers. It is not part of the proof: a cell that the device
+//! asks for and that was left out is answered by "outside", and the verifier reports it. So plain
+//! arithmetic will do here.
 //!
 //! | the event | explored as |
 //! |---|---|
-//! | exactly known: one loss, one initial state, no errors | [`segments`]: the states that the unknown moment of the event within a tick makes possible, tick by tick through the firmware's own phase machine |
-//! | uncertain, with `stay` | [`whole_cells`]: from the cells of the trigger, cell by cell through the abstraction; the games were won on those very cells |
+//! | exactly known: one loss, one initial state, no errors | [`segments`]: states, tick by tick |
+//! | uncertain, with `stay` | [`whole_cells`]: cells, from the trigger on |
 //!
-//! An uncertain event without `stay` has no bound: in Fixed there is no game, and whole cells there spread over
-//! everything.
+//! Segments hold the states that the unknown moment of the event within a tick makes possible; they
+//! go through the firmware's own phase machine. Cells go through the abstraction, on which the
+//! games were won.
+//!
+//! An uncertain event without `stay` has no bound: in Fixed there is no game, and whole cells there
+//! spread over everything.
 
 pub mod segments;
 pub mod whole_cells;
@@ -19,6 +24,7 @@ use firmware::table::{LAWS, TableView};
 use super::CompressError;
 use crate::abstraction::affine::AffineAbstraction;
 use crate::game::bitset::BitSet;
+use crate::problem::Problem;
 use model::plant::STATES;
 use model::spec::Spec;
 
@@ -27,8 +33,8 @@ use model::spec::Spec;
 pub struct Asked {
     /// Cells for which it asks each law, in the order of the directory.
     pub laws: [BitSet; LAWS],
-    /// Whether the union of these cells is closed under the abstraction: then any allowed input whose box stays in it
-    /// will do, and not only the explored one.
+    /// Whether the union of these cells is closed under the abstraction: then any allowed input
+    /// whose box stays in it will do, and not only the explored one.
     pub closed: bool,
 }
 
@@ -37,10 +43,11 @@ pub struct Asked {
 /// # Errors
 /// A spec whose closed loop cannot be explored, or a loop that leaves the table.
 pub fn reachable(
-    spec: &Spec,
+    problem: &Problem,
     abstraction: &AffineAbstraction<STATES>,
     table: &TableView<'_>,
 ) -> Result<Asked, CompressError> {
+    let spec = &problem.spec;
     if exactly_known(spec) {
         let laws = segments::explore(spec, table)?;
         return Ok(Asked {
@@ -49,7 +56,7 @@ pub fn reachable(
         });
     }
     if spec.requirements.stay {
-        let laws = whole_cells::explore(spec, abstraction, table)?;
+        let laws = whole_cells::explore(problem, abstraction, table)?;
         return Ok(Asked { laws, closed: true });
     }
     Err(CompressError::Unbounded)

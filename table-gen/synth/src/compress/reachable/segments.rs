@@ -1,17 +1,19 @@
-//! An exactly known event: only its moment within a tick is open, so the states at a tick are a curve.
+//! An exactly known event: only its moment within a tick is open, so the states at a tick are a
+//! curve.
 //!
-//! The curve is cut into short straight segments, each carried by its two ends. While both ends decide alike, all of the
-//! segment does (decisions change at planes between cells and at the ends of bands, and boxes are convex). Where they
-//! differ, the segment is halved, down to a length at which both answers are followed for all of it.
+//! The curve is cut into short straight segments, each carried by its two ends. While both ends
+//! decide alike, all of the segment does (decisions change at planes between cells and at the ends
+//! of bands, and boxes are convex). Where they differ, the segment is halved, down to a length at
+//! which both answers are followed for all of it.
 
 use firmware::phase::{Decision, Phase, PhaseState};
 use firmware::table::{LAWS, Law, TableView};
 use firmware::units::State;
 
 use super::super::CompressError;
+use crate::drives::MICRO;
 use crate::game::bitset::BitSet;
-use crate::synthesis::MICRO;
-use model::plant::{GridPlant, STATES};
+use model::plant::{Plant, STATES};
 use model::propagator::Propagator;
 use model::spec::Spec;
 
@@ -19,7 +21,8 @@ use model::spec::Spec;
 const SEGMENTS: u32 = 64;
 /// Halvings of a segment before both answers are followed.
 const HALVINGS_MAX: u32 = 24;
-/// Time that is explored if the spec has no horizon \[s\]: the slow pair of poles decays by e^-77 in 1000 s.
+/// Time that is explored if the spec has no horizon \[s\]: the slow pair of poles decays by e^-77
+/// in 1000 s.
 const HORIZON_S: f64 = 1000.0;
 /// Most steps in all: a loop whose branches multiply without end is given up.
 const STEPS_MAX: u64 = 200_000_000;
@@ -40,7 +43,7 @@ struct Segment {
 pub fn explore(spec: &Spec, table: &TableView<'_>) -> Result<[BitSet; LAWS], CompressError> {
     let grid = table.header().grid;
     let tick_s = f64::from(spec.sampling.watch_ms()) / 1000.0;
-    let plant = GridPlant::new(spec);
+    let plant = Plant::new(spec);
     let step = Propagator::new(&plant, tick_s);
     let horizon_s = spec.requirements.horizon_s.unwrap_or(HORIZON_S);
     let ticks = (horizon_s / tick_s).ceil() as u64;
@@ -86,7 +89,7 @@ pub fn explore(spec: &Spec, table: &TableView<'_>) -> Result<[BitSet; LAWS], Com
 }
 
 /// The states at the first tick after the event, which came up to a tick before it.
-fn first_segments(spec: &Spec, plant: &GridPlant, tick_s: f64) -> Vec<Segment> {
+fn first_segments(spec: &Spec, plant: &Plant, tick_s: f64) -> Vec<Segment> {
     let start = spec.uncertainty.initial.lower;
     let at = |share: f64| {
         Propagator::new(plant, tick_s * share).step(&start, -spec.uncertainty.loss_gw[0])

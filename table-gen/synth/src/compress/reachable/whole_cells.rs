@@ -1,12 +1,14 @@
 //! An uncertain event: whole cells, from the trigger on.
 //!
-//! Before the trigger (No control) there is no game. The states in which f can first be seen below I1 are enclosed in
-//! boxes, one for each short piece of time: the flow of the initial box under the loss band, cut at the largest fall of f
-//! within a tick. From there every decision takes a cell to the abstraction's box of cells. Where commands act with a delay, the boxes
-//! are carried over it without a response: decisions go by the prediction.
+//! Before the trigger (No control) there is no game. The states in which f can first be seen below
+//! I1 are enclosed in boxes, one for each short piece of time: the flow of the initial box under
+//! the loss band, cut at the largest fall of f within a tick. From there every decision takes a
+//! cell to the abstraction's box of cells. Where commands act with a delay, the boxes are carried
+//! over it without a response: decisions go by the prediction.
 //!
-//! The boxes over a delay are to hold the verifier's sets, or its verdict meets cells that were left out. Those sets follow the initial box exactly,
-//! carry what the loss varies tick by tick by |exp(A tick)| at the worst, and are cut at I1; so the same is done here with pieces, for
+//! The boxes over a delay are to hold the verifier's sets, or its verdict meets cells that were
+//! left out. Those sets follow the initial box exactly, carry what the loss varies tick by tick by
+//! |exp(A tick)| at the worst, and are cut at I1; so the same is done here with pieces, for
 //! |exp(A tick)| is no more than the product of its pieces' magnitudes.
 
 use firmware::grid::Cell;
@@ -15,19 +17,21 @@ use firmware::table::{LAWS, Law, TableView};
 use super::super::CompressError;
 use crate::abstraction::Abstraction;
 use crate::abstraction::affine::AffineAbstraction;
-use crate::delay::{Delay, DelayError};
+use crate::drives::MICRO;
 use crate::game::bitset::BitSet;
-use crate::synthesis::{MICRO, measurement_micro, net_power};
+use crate::problem::Problem;
 use model::flow::{Flow, absolute_integral, product};
 use model::interval::Interval;
-use model::plant::{GridPlant, STATES};
+use model::plant::STATES;
 use model::spec::Spec;
 
 /// Pieces into which a tick is cut.
 const PIECES: u32 = 8;
-/// Room around the boxes over a delay, in cells: for the bend between the ends of a piece, and for roundings.
+/// Room around the boxes over a delay, in cells: for the bend between the ends of a piece, and for
+/// roundings.
 const ROOM_CELLS: f64 = 0.01;
-/// Longest time to the trigger that is looked at \[s\]: past it the initial box must have left I1 or stays.
+/// Longest time to the trigger that is looked at \[s\]: past it the initial box must have left I1
+/// or stays.
 const TRIGGER_S_MAX: f64 = 60.0;
 
 /// Explores; the table must hold every law with its whole domain.
@@ -35,7 +39,7 @@ const TRIGGER_S_MAX: f64 = 60.0;
 /// # Errors
 /// A loop that reaches a cell without an entry.
 pub fn explore(
-    spec: &Spec,
+    problem: &Problem,
     abstraction: &AffineAbstraction<STATES>,
     table: &TableView<'_>,
 ) -> Result<[BitSet; LAWS], CompressError> {
@@ -44,8 +48,8 @@ pub fn explore(
     let mut asked: [BitSet; LAWS] = std::array::from_fn(|_| BitSet::new(shape.cells()));
     let mut seen = BitSet::new(shape.cells());
     let mut open: Vec<usize> = Vec::new();
-    for (low, high) in trigger_boxes(spec)? {
-        each_cell(spec, abstraction, low, high, |index| {
+    for (low, high) in trigger_boxes(problem) {
+        each_cell(&problem.spec, abstraction, low, high, |index| {
             if !seen.contains(index) {
                 seen.insert(index);
                 open.push(index);
@@ -101,22 +105,23 @@ pub fn explore(
 /// Lowest and highest of each state \[micro-units\].
 type Box4 = ([f64; STATES], [f64; STATES]);
 
-/// Boxes that hold every state on which the first decision may go: those in which a tick first finds f below I1, or what is predicted
-/// from them.
-fn trigger_boxes(spec: &Spec) -> Result<Vec<Box4>, DelayError> {
-    let delay = Delay::of(spec)?;
-    let (a, b) = GridPlant::new(spec).matrices();
+/// Boxes that hold every state on which the first decision may go: those in which a tick first
+/// finds f below I1, or what is predicted from them.
+fn trigger_boxes(problem: &Problem) -> Vec<Box4> {
+    let (spec, delay) = (&problem.spec, &problem.delay);
+    let (a, b) = (problem.a, problem.b);
     let tick_s = f64::from(spec.sampling.watch_ms()) / 1000.0;
     let piece_s = tick_s / f64::from(PIECES);
     let step = Flow::over(&a, &b, piece_s);
-    let error = measurement_micro(spec);
+    let error = problem.measurement;
     let below = f64::from(spec.requirements.outer_micro()[0]) + error[0];
-    let drive = net_power(spec, 0);
+    let drive = problem.inputs[0].drive;
     let middle = Interval::point(drive.mid());
     let varying = absolute_integral(&a, &b, piece_s).map(|x| x * drive.radius());
     let initial = &spec.uncertainty.initial;
     let widths = spec.grid.widths_micro();
-    // Without a delay the boxes are those of the estimate; else of the real state, and the prediction adds the error.
+    // Without a delay the boxes are those of the estimate; else of the real state, and the
+    // prediction adds the error.
     let (around, room) = match delay {
         None => (error, [0.0; STATES]),
         Some(_) => (
@@ -124,7 +129,8 @@ fn trigger_boxes(spec: &Spec) -> Result<Vec<Box4>, DelayError> {
             widths.map(|width| ROOM_CELLS * f64::from(width)),
         ),
     };
-    // The flow of the box is that of its centre plus its generators; a sum of magnitudes bounds them.
+    // The flow of the box is that of its centre plus its generators; a sum of magnitudes bounds
+    // them.
     let mut centre: [Interval; STATES] = std::array::from_fn(|d| {
         Interval::point(0.5 * (initial.lower[d] + initial.upper[d]) * MICRO)
     });
@@ -156,8 +162,8 @@ fn trigger_boxes(spec: &Spec) -> Result<Vec<Box4>, DelayError> {
             let first: [f64; STATES] = std::array::from_fn(|d| low[d].min(was_low[d]));
             let last: [f64; STATES] = std::array::from_fn(|d| high[d].max(was_high[d]));
             if first[0] < below {
-                // Seen at the first tick below: within a tick's fall of the limit.
-                // Over a delay the box's extent would count again and again; a tick's own fall is enough.
+                // Seen at the first tick below: within a tick's fall of the limit. Over a delay the
+                // box's extent would count again and again; a tick's own fall is enough.
                 let extent = if delay.is_some() {
                     0.0
                 } else {
@@ -187,16 +193,18 @@ fn trigger_boxes(spec: &Spec) -> Result<Vec<Box4>, DelayError> {
         centre = std::array::from_fn(|d| flowed[d] + step.gamma[d] * middle);
         phi = product(&step.phi, &phi);
         varied = match delay {
-            // Every box reaches down by its own extent in f then, which is more than what is left out here.
+            // Every box reaches down by its own extent in f then, which is more than what is left
+            // out here.
             None => std::array::from_fn(|d| varied[d] + varying[d]),
             Some(_) => carried(&step, &varied, &varying),
         };
         ticks += 1.0;
     }
-    Ok(boxes)
+    boxes
 }
 
-/// What has varied after one more piece. What varied one state before moves the others in it: the governor answers what varied f.
+/// What has varied after one more piece. What varied one state before moves the others in it: the
+/// governor answers what varied f.
 fn carried(step: &Flow<STATES>, varied: &[f64; STATES], varying: &[f64; STATES]) -> [f64; STATES] {
     std::array::from_fn(|d| {
         let terms = step.phi[d].iter().zip(varied);
@@ -269,13 +277,15 @@ fn each_in(low: [u32; STATES], high: [u32; STATES], mut call: impl FnMut([u32; S
 #[cfg(test)]
 mod tests {
     use super::*;
+    use model::plant::Plant;
 
-    /// Pieces together vary no less than the whole time: `∫ |exp(A s) b| ds`, which a loss that switches at the right moments attains.
+    /// Pieces together vary no less than the whole time: `∫ |exp(A s) b| ds`, which a loss that
+    /// switches at the right moments attains.
     #[test]
     fn pieces_carry_what_varied_before() {
         const COUNT: u32 = 160;
         let spec = Spec::load("gb-bi-delay", &[]).unwrap();
-        let (a, b) = GridPlant::new(&spec).matrices();
+        let (a, b) = Plant::new(&spec).matrices();
         let piece_s = 0.0125;
         let step = Flow::over(&a, &b, piece_s);
         let varying = absolute_integral(&a, &b, piece_s);
@@ -283,7 +293,8 @@ mod tests {
         for _ in 0..COUNT {
             varied = carried(&step, &varied, &varying);
         }
-        // Enclosures rounded upwards on one side, plain sums on the other: far below one in 1e9 after 160 steps.
+        // Enclosures rounded upwards on one side, plain sums on the other: far below one in 1e9
+        // after 160 steps.
         let whole = absolute_integral(&a, &b, piece_s * f64::from(COUNT));
         for d in 0..STATES {
             assert!(

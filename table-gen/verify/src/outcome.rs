@@ -37,7 +37,7 @@ pub(crate) struct Found {
 
 /// Bounds and violations.
 #[derive(Debug, Clone, Default)]
-pub(crate) struct Tally {
+pub(crate) struct Outcome {
     /// Lowest frequency bound, between samples too \[µHz\].
     pub(crate) lowest: Option<f64>,
     /// Highest frequency bound, between samples too \[µHz\].
@@ -64,7 +64,7 @@ pub(crate) struct Tally {
     pub(crate) limit: Option<String>,
 }
 
-impl Tally {
+impl Outcome {
     /// Notes a violation, unless one of its kind is known.
     pub(crate) fn violate(&mut self, kind: Violation, what: &str, trace: u32, traces: &Traces) {
         self.violations.entry(kind).or_insert_with(|| Found {
@@ -106,7 +106,8 @@ impl Tally {
     }
 }
 
-/// Whether C1 decided although f is in I1 and the table has a law for that: C2 does not cover where C1 hands over.
+/// Whether C1 decided although f is in I1 and the table has a law for that: C2 does not cover where
+/// C1 hands over.
 pub(crate) fn missed_handover(table: &TableView<'_>, phase: Phase, measured: State) -> bool {
     phase == Phase::C1 && table.law(Law::C2).is_some() && table.header().outer.contains(measured)
 }

@@ -1,7 +1,9 @@
-//! No control: tight sets from the event to the first decision, for tables that then go on for ever in whole cells.
+//! No control: tight sets from the event to the first decision, for tables that then go on for ever
+//! in whole cells.
 //!
-//! Where the frequency may stay above I1 for ever, the sets are closed by a box: a box R with "R after a round lies in
-//! R" holds at the beginning of every later round, so the sets of one round from R speak for all later times.
+//! Where the frequency may stay above I1 for ever, the sets are closed by a box: a box R with "R
+//! after a round lies in R" holds at the beginning of every later round, so the sets of one round
+//! from R speak for all later times.
 
 use std::collections::BTreeMap;
 
@@ -12,25 +14,26 @@ use firmware::units::{AXIS_F, State};
 
 use super::cellset::CellSet;
 use super::closed_loop::Model;
-use super::event;
+use super::first_tick;
+use super::held_input::Linear;
+use super::outcome::{Outcome, Violation};
 use super::path::{PathStep, Traces};
 use super::regions::Regions;
-use super::segment::Linear;
 use super::successor::{Cells, index};
-use super::tally::{Tally, Violation};
 use super::zonotope::Zonotope;
 use model::interval::Interval;
 use model::plant::STATES;
 
-/// Time in No control that is followed from the event, and length of a round \[s\]; long against the plant's slowest
-/// mode (13 s for the paper's), so that a round contracts.
+/// Time in No control that is followed from the event, and length of a round \[s\]; long against
+/// the plant's slowest mode (13 s for the paper's), so that a round contracts.
 const ROUND_S: f64 = 60.0;
 /// Rounds in which a box that closes must be found.
 const ROUNDS_MAX: u32 = 8;
 /// By how much a box that did not close is widened \[share of its width\].
 const WIDEN: f64 = 0.05;
 
-/// Cells up to which a set is cut cell by cell; past that the box around it is taken, which is cheaper and looser.
+/// Cells up to which a set is cut cell by cell; past that the box around it is taken, which is
+/// cheaper and looser.
 const TIGHT_CELLS_MAX: u64 = 4096;
 
 /// Where No control can end.
@@ -40,12 +43,13 @@ pub(super) struct Watched {
     /// The same cells as bits: most cells are met many times.
     seen: CellSet,
     pub(super) traces: Traces,
-    /// Last tick, from the first after the event, at which the first decision may come; `None` if there is no last.
+    /// Last tick, from the first after the event, at which the first decision may come; `None` if
+    /// there is no last.
     pub(super) last_tick: Option<u32>,
 }
 
 /// The exploration of No control.
-pub(super) struct Watching<'a> {
+pub(super) struct NoControl<'a> {
     pub(super) table: &'a TableView<'a>,
     pub(super) model: &'a Model,
     /// The real states by what is measured of them.
@@ -54,9 +58,9 @@ pub(super) struct Watching<'a> {
     pub(super) first: &'a Regions,
 }
 
-impl Watching<'_> {
+impl NoControl<'_> {
     /// Follows No control until no state is left in it, or until it is closed.
-    pub(super) fn watch(&self, tally: &mut Tally) -> Watched {
+    pub(super) fn watch(&self, tally: &mut Outcome) -> Watched {
         let mut out = Watched {
             seeds: BTreeMap::new(),
             seen: CellSet::new(&self.table.header().grid),
@@ -67,7 +71,7 @@ impl Watching<'_> {
         let range = self.model.tick.frequency(&self.model.initial, drive);
         let root = out.traces.push(None, PathStep::event(range));
         tally.flown(self.model, range, root, &out.traces);
-        let sets = event::first_tick(self.model)
+        let sets = first_tick::first_tick(self.model)
             .into_iter()
             .map(|set| (root, set))
             .collect();
@@ -100,7 +104,7 @@ impl Watching<'_> {
         first: u32,
         ticks: u32,
         mut sets: Vec<(u32, Zonotope)>,
-        tally: &mut Tally,
+        tally: &mut Outcome,
         out: &mut Watched,
     ) -> Vec<(u32, Zonotope)> {
         let state = PhaseState::INITIAL;
@@ -133,12 +137,13 @@ impl Watching<'_> {
         sets
     }
 
-    /// The cells of the first decision: tightly if they are few, else those of the box around the set.
+    /// The cells of the first decision: tightly if they are few, else those of the box around the
+    /// set.
     fn decide(
         &self,
         set: &Zonotope,
         (parent, tick): (u32, u32),
-        tally: &mut Tally,
+        tally: &mut Outcome,
         out: &mut Watched,
     ) {
         let grid = &self.table.header().grid;
@@ -171,16 +176,16 @@ impl Watching<'_> {
         }
     }
 
-    /// A set at the trigger as the device expects it when its first command begins to act: the set itself without a delay. Until then
-    /// nothing acts, and f is bounded.
+    /// A set at the trigger as the device expects it when its first command begins to act: the set
+    /// itself without a delay. Until then nothing acts, and f is bounded.
     fn ahead(
         &self,
         set: &Zonotope,
         (parent, tick): (u32, u32),
-        tally: &mut Tally,
+        tally: &mut Outcome,
         out: &mut Watched,
     ) -> Option<Zonotope> {
-        let Some(delay) = &self.model.knowledge.delay else {
+        let Some(delay) = &self.model.known.delay else {
             return Some(set.clone());
         };
         let step = PathStep {
@@ -206,7 +211,7 @@ impl Watching<'_> {
 
     /// What the machine decides at the trigger on a state of the first decision.
     fn ask(&self, state: State) -> (PhaseState, Decision) {
-        if self.model.knowledge.delay.is_none() {
+        if self.model.known.delay.is_none() {
             return PhaseState::INITIAL.step(self.table, state);
         }
         // What was measured lies below I1; where, does not matter.
@@ -223,7 +228,7 @@ impl Watching<'_> {
         };
         for d in 0..STATES {
             let bounds = set.bounds(d);
-            let error = self.model.knowledge.first[d];
+            let error = self.model.known.first[d];
             let grid = &self.table.header().grid;
             cells.low[d] = index(grid, d, (bounds.low - error).next_down())?;
             cells.high[d] = index(grid, d, (bounds.high + error).next_up())?;
@@ -237,7 +242,7 @@ impl Watching<'_> {
         measured: State,
         f: Interval,
         (parent, tick): (u32, u32),
-        tally: &mut Tally,
+        tally: &mut Outcome,
         out: &mut Watched,
     ) {
         let grid = &self.table.header().grid;

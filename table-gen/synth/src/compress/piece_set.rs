@@ -1,4 +1,4 @@
-//! Which affine laws a tree's leaves may name, and the labels that this gives a cell.
+//! Which affine pieces a tree's leaves may name, and the labels that this gives a cell.
 
 use firmware::grid::Cell;
 use firmware::table::{AffineFunction, LEAF_AFFINE};
@@ -8,28 +8,28 @@ use super::cells::LabelledCell;
 use super::tree::Tree;
 use model::plant::STATES;
 
-/// Most laws in a set: what a label set has room for is 32; each costs 12 bytes.
-const LAWS_MAX: usize = 8;
-/// A further law must fit at least one of this many cells that no law before it fits.
+/// Most pieces in a set: what a label set has room for is 32; each costs 12 bytes.
+const PIECES_MAX: usize = 8;
+/// A further piece must fit at least one of this many cells that no piece before it fits.
 const WORTH_ONE_IN: usize = 500;
-/// Cells that a choice of laws looks at; more are sampled.
+/// Cells that a choice of pieces looks at; more are sampled.
 const SAMPLE_CELLS: usize = 200_000;
 
-/// Affine laws and the number of input levels.
+/// Affine pieces and the number of input levels.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct LawSet {
-    /// The laws; leaf 32 + k names the k-th.
-    pub laws: Vec<AffineFunction>,
+pub struct PieceSet {
+    /// The pieces; leaf 32 + k names the k-th.
+    pub pieces: Vec<AffineFunction>,
     /// Input levels.
     pub levels: u8,
 }
 
-impl LawSet {
+impl PieceSet {
     /// Leaf values that give a cell an allowed input (bit u of `allowed` for level u).
     pub fn labels(&self, cell: [u16; STATES], allowed: u32) -> u64 {
         let mut labels = u64::from(allowed);
-        for (k, law) in self.laws.iter().enumerate() {
-            let fits = u64::from(allowed >> law.level(Cell(cell), self.levels) & 1);
+        for (k, piece) in self.pieces.iter().enumerate() {
+            let fits = u64::from(allowed >> piece.level(Cell(cell), self.levels) & 1);
             labels |= fits << (usize::from(LEAF_AFFINE) + k);
         }
         labels
@@ -39,21 +39,21 @@ impl LawSet {
     pub fn level(&self, leaf: u8, cell: [u16; STATES]) -> u8 {
         match leaf.checked_sub(LEAF_AFFINE) {
             None => leaf,
-            Some(law) => self
-                .laws
-                .get(usize::from(law))
-                .map_or(0, |law| law.level(Cell(cell), self.levels)),
+            Some(piece) => self
+                .pieces
+                .get(usize::from(piece))
+                .map_or(0, |piece| piece.level(Cell(cell), self.levels)),
         }
     }
 
-    /// The leaf that a box gets of those in common: the earliest law, else the level nearest to what the first law says
-    /// on average there, so that neighbouring boxes differ little.
+    /// The leaf that a box gets of those in common: the earliest piece, else the level nearest to
+    /// what the first piece says on average there, so that neighbouring boxes differ little.
     pub fn choose(&self, common: u64, cells: &[LabelledCell]) -> u8 {
-        let laws = common >> LEAF_AFFINE;
-        if laws != 0 {
-            return LEAF_AFFINE + laws.trailing_zeros() as u8;
+        let pieces = common >> LEAF_AFFINE;
+        if pieces != 0 {
+            return LEAF_AFFINE + pieces.trailing_zeros() as u8;
         }
-        let Some(first) = self.laws.first() else {
+        let Some(first) = self.pieces.first() else {
             return common.trailing_zeros() as u8;
         };
         let sum: u64 = cells
@@ -67,61 +67,63 @@ impl LawSet {
             .unwrap_or(0)
     }
 
-    /// The set without the laws that a tree does not name, and the tree with its leaves renumbered.
+    /// The set without the pieces that a tree does not name, and the tree with its leaves
+    /// renumbered.
     pub fn used(&self, tree: &Tree) -> (Self, Tree) {
         let named = tree.values();
         let mut renumbered = [0u8; 64];
-        let mut laws = Vec::new();
+        let mut pieces = Vec::new();
         for value in 0..64u8 {
-            let law = value.checked_sub(LEAF_AFFINE).map(usize::from);
-            renumbered[usize::from(value)] = match law.and_then(|k| self.laws.get(k)) {
-                Some(law) if named >> value & 1 == 1 => {
-                    laws.push(*law);
-                    LEAF_AFFINE + laws.len() as u8 - 1
+            let piece = value.checked_sub(LEAF_AFFINE).map(usize::from);
+            renumbered[usize::from(value)] = match piece.and_then(|k| self.pieces.get(k)) {
+                Some(piece) if named >> value & 1 == 1 => {
+                    pieces.push(*piece);
+                    LEAF_AFFINE + pieces.len() as u8 - 1
                 }
                 _ => value,
             };
         }
         let levels = self.levels;
-        (Self { laws, levels }, tree.renumbered(&renumbered))
+        (Self { pieces, levels }, tree.renumbered(&renumbered))
     }
 }
 
-/// Chooses laws from candidates: each in turn the one that fits the most cells (by index and allowed inputs) that no
-/// earlier law fits. The first is always chosen, the others while they are worth their bytes.
-pub fn choose_laws(
+/// Chooses pieces from candidates: each in turn the one that fits the most cells (by index and
+/// allowed inputs) that no earlier piece fits. The first is always chosen, the others while they
+/// are worth their bytes.
+pub fn choose_pieces(
     candidates: &[AffineFunction],
     levels: u8,
     cells: &[([u16; STATES], u32)],
-) -> LawSet {
+) -> PieceSet {
     let every = cells.len().div_ceil(SAMPLE_CELLS).max(1);
     let mut open: Vec<_> = cells.iter().step_by(every).copied().collect();
     let worth = open.len() / WORTH_ONE_IN;
-    let fits = |law: &AffineFunction, (cell, allowed): &([u16; STATES], u32)| {
-        allowed >> law.level(Cell(*cell), levels) & 1 == 1
+    let fits = |piece: &AffineFunction, (cell, allowed): &([u16; STATES], u32)| {
+        allowed >> piece.level(Cell(*cell), levels) & 1 == 1
     };
-    let mut laws: Vec<AffineFunction> = Vec::new();
-    while laws.len() < LAWS_MAX {
+    let mut pieces: Vec<AffineFunction> = Vec::new();
+    while pieces.len() < PIECES_MAX {
         let counts: Vec<usize> = candidates
             .par_iter()
-            .map(|law| open.iter().filter(|cell| fits(law, cell)).count())
+            .map(|piece| open.iter().filter(|cell| fits(piece, cell)).count())
             .collect();
         // Of equals the first candidate.
         let best = counts.iter().enumerate().rev().max_by_key(|(_, n)| **n);
         let Some((at, count)) = best else { break };
-        if !laws.is_empty() && *count <= worth {
+        if !pieces.is_empty() && *count <= worth {
             break;
         }
-        laws.push(candidates[at]);
+        pieces.push(candidates[at]);
         open.retain(|cell| !fits(&candidates[at], cell));
     }
-    LawSet { laws, levels }
+    PieceSet { pieces, levels }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::compress::split::Plane;
+    use crate::compress::best_plane::Plane;
     use firmware::table::AFFINE_FRACTION_BITS;
 
     const ONE: i32 = 1 << AFFINE_FRACTION_BITS;
@@ -136,46 +138,46 @@ mod tests {
         constant: 3 * ONE,
     };
     const LEVELS: u8 = 8;
-    const LAW: u64 = 1 << LEAF_AFFINE;
+    const PIECE: u64 = 1 << LEAF_AFFINE;
 
     fn at(f: u16) -> [u16; STATES] {
         [f, 0, 0, 0]
     }
 
-    fn set(laws: &[AffineFunction]) -> LawSet {
-        LawSet {
-            laws: laws.to_vec(),
+    fn set(pieces: &[AffineFunction]) -> PieceSet {
+        PieceSet {
+            pieces: pieces.to_vec(),
             levels: LEVELS,
         }
     }
 
     #[test]
-    fn a_cell_may_name_its_levels_and_the_laws_that_give_one_of_them() {
+    fn a_cell_may_name_its_levels_and_the_pieces_that_give_one_of_them() {
         let set = set(&[RISING, THREE]);
-        assert_eq!(set.labels(at(2), 0b0101), 0b0101 | LAW);
-        assert_eq!(set.labels(at(1), 0b1101), 0b1101 | LAW << 1);
+        assert_eq!(set.labels(at(2), 0b0101), 0b0101 | PIECE);
+        assert_eq!(set.labels(at(1), 0b1101), 0b1101 | PIECE << 1);
         assert_eq!(set.labels(at(1), 0b0101), 0b0101);
-        // A leaf that names a level gives it; one that names a law gives what the law says.
+        // A leaf that names a level gives it; one that names a piece gives what the piece says.
         assert_eq!(set.level(5, at(2)), 5);
         assert_eq!(set.level(LEAF_AFFINE, at(2)), 2);
         assert_eq!(set.level(LEAF_AFFINE + 1, at(2)), 3);
     }
 
     #[test]
-    fn a_box_gets_the_first_law_or_the_level_nearest_to_it() {
+    fn a_box_gets_the_first_piece_or_the_level_nearest_to_it() {
         let set = set(&[RISING, THREE]);
         let cells = [2, 4].map(|f| LabelledCell {
             cell: at(f),
             labels: 1,
         });
-        assert_eq!(set.choose(0b0100 | LAW << 1, &cells), LEAF_AFFINE + 1);
-        // The first law says 3 on average.
+        assert_eq!(set.choose(0b0100 | PIECE << 1, &cells), LEAF_AFFINE + 1);
+        // The first piece says 3 on average.
         assert_eq!(set.choose(0b10_0101, &cells), 2);
         assert_eq!(set.choose(0b11_0001, &cells), 4);
     }
 
     #[test]
-    fn laws_that_no_leaf_names_are_dropped() {
+    fn pieces_that_no_leaf_names_are_dropped() {
         let tree = Tree::Split {
             plane: Plane {
                 axis: 0,
@@ -185,20 +187,20 @@ mod tests {
             right: Box::new(Tree::Leaf(LEAF_AFFINE + 1)),
         };
         let (kept, renumbered) = set(&[RISING, THREE]).used(&tree);
-        assert_eq!(kept.laws, [THREE]);
+        assert_eq!(kept.pieces, [THREE]);
         assert_eq!(renumbered.leaf(Cell(at(0))), 6);
         assert_eq!(renumbered.leaf(Cell(at(1))), LEAF_AFFINE);
     }
 
     #[test]
-    fn laws_are_chosen_by_the_cells_that_they_add() {
+    fn pieces_are_chosen_by_the_cells_that_they_add() {
         // RISING fits f = 0 to 4 and THREE fits 3, 5 and 6: after RISING it adds two.
         let mut cells: Vec<_> = (0..5).map(|f| (at(f), 1 << f)).collect();
         cells.extend([5, 6].map(|f| (at(f), 1 << 3)));
-        let chosen = choose_laws(&[THREE, RISING], LEVELS, &cells);
-        assert_eq!(chosen.laws, [RISING, THREE]);
+        let chosen = choose_pieces(&[THREE, RISING], LEVELS, &cells);
+        assert_eq!(chosen.pieces, [RISING, THREE]);
         // Where the first fits all, no second is worth its bytes.
-        let chosen = choose_laws(&[THREE, RISING], LEVELS, &cells[..5]);
-        assert_eq!(chosen.laws, [RISING]);
+        let chosen = choose_pieces(&[THREE, RISING], LEVELS, &cells[..5]);
+        assert_eq!(chosen.pieces, [RISING]);
     }
 }

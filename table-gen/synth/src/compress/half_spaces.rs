@@ -1,9 +1,9 @@
 //! Half-spaces that bound a winning set.
 //!
-//! A state is lost if it must leave the grid or the containment band now or k steps from now. For a linear plant each of
-//! these conditions, under a saturated input, is a half-space whose normal is a row of Φ(kτ); so the rows of the flow at
-//! multiples of half a period are the candidates. Constants come from the cells themselves: nothing rests on the normals
-//! being right.
+//! A state is lost if it must leave the grid or the containment band now or k steps from now. For a
+//! linear plant each of these conditions, under a saturated input, is a half-space whose normal is
+//! a row of Φ(kτ); so the rows of the flow at multiples of half a period are the candidates.
+//! Constants come from the cells themselves: nothing rests on the normals being right.
 
 use firmware::table::AffineFunction;
 use rayon::prelude::*;
@@ -11,7 +11,7 @@ use rayon::prelude::*;
 use model::flow::Flow;
 use model::grid_shape::GridShape;
 use model::interval::Interval;
-use model::plant::{GridPlant, STATES};
+use model::plant::{Plant, STATES};
 use model::spec::Spec;
 
 /// Largest factor of a half-space.
@@ -32,7 +32,7 @@ pub type Point = [i32; STATES];
 
 /// Candidate normals, both ways.
 pub fn normals(spec: &Spec, shape: &GridShape<STATES>) -> Vec<[i16; STATES]> {
-    let (a, b) = GridPlant::new(spec).matrices();
+    let (a, b) = Plant::new(spec).matrices();
     let mut found = Vec::new();
     for half_periods in 0..=HALF_PERIODS {
         let time_s = f64::from(half_periods) * 0.5 * spec.sampling.period_s;
@@ -54,7 +54,8 @@ pub fn normals(spec: &Spec, shape: &GridShape<STATES>) -> Vec<[i16; STATES]> {
     found
 }
 
-/// A convex hull: half-spaces that together hold nearly all winning cells and few losing ones, by greedy cuts.
+/// A convex hull: half-spaces that together hold nearly all winning cells and few losing ones, by
+/// greedy cuts.
 pub fn hull(normals: &[[i16; STATES]], winning: &[Point], losing: &[Point]) -> Vec<AffineFunction> {
     let mut winning = sample(winning);
     let mut losing = sample(losing);
@@ -91,7 +92,8 @@ fn sample(points: &[Point]) -> (Vec<Point>, usize) {
     (points.iter().step_by(every).copied().collect(), every)
 }
 
-/// The threshold of `normal·x >= threshold` with the best score: losing cells shed, less `weight` times winning ones.
+/// The threshold of `normal·x >= threshold` with the best score: losing cells shed, less `weight`
+/// times winning ones.
 fn best_cut(
     normal: [i16; STATES],
     winning: &[Point],
@@ -134,8 +136,8 @@ pub fn value(space: &AffineFunction, point: Point) -> i32 {
     sum
 }
 
-/// The same half-space, moved inwards by shares of its largest factor: in a box where losing cells lie just inside, a
-/// tighter one separates.
+/// The same half-space, moved inwards by shares of its largest factor: in a box where losing cells
+/// lie just inside, a tighter one separates.
 pub fn tightened(space: &AffineFunction, shares: u32) -> impl Iterator<Item = AffineFunction> + '_ {
     let largest = space.factors.iter().map(|x| x.unsigned_abs()).max();
     let largest = i32::from(largest.unwrap_or(0));

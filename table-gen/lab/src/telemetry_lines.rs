@@ -1,7 +1,9 @@
-//! Telemetry of a charger, live from a serial port or from a recording: bytes in, one decoded tick a line out.
+//! Telemetry of a charger, live from a serial port or from a recording: bytes in, one decoded tick
+//! a line out.
 //!
-//! The stream is cut at zero bytes; whatever does not decode is counted and skipped, so that joining in the middle or a
-//! disturbed line costs frames and nothing else. The format is `docs/telemetry.md`.
+//! The stream is cut at zero bytes; whatever does not decode is counted and skipped, so that
+//! joining in the middle or a disturbed line costs frames and nothing else. The format is
+//! `docs/telemetry.md`.
 
 use std::fmt::Write as _;
 use std::io::{self, Read, Write};
@@ -136,8 +138,8 @@ pub fn line(frame: &Frame) -> String {
     text
 }
 
-/// Reads a stream to its end (a port: until `stop`) and writes a line for every `every`-th tick and every tick whose mode,
-/// phase or faults changed. Without `out` it only counts.
+/// Reads a stream to its end (a port: until `stop`) and writes a line for every `every`-th tick and
+/// every tick whose mode, phase or faults changed. Without `out` it only counts.
 ///
 /// # Errors
 /// The stream cannot be read, or the lines cannot be written.

@@ -1,4 +1,4 @@
-//! Candidate laws: the affine inputs that bring f to a set-point at the next decision.
+//! Candidate pieces: the affine inputs that bring f to a set-point at the next decision.
 //!
 //! With the input held over a time t, `f(t) = Φ_f x + Γ_f (P u - w)`. Solved for u,
 //!
@@ -6,16 +6,16 @@
 //! u = (f* - k Φ_f x + Γ_f w) / (Γ_f P)
 //! ```
 //!
-//! is the deadbeat input for k = 1; other k press harder or softer. Nothing rests on these laws being good: the game
-//! decides cell by cell whether one may be used.
+//! is the deadbeat input for k = 1; other k press harder or softer. Nothing rests on these pieces
+//! being good: the game decides cell by cell whether one may be used.
 
 use firmware::table::{AFFINE_FRACTION_BITS, AffineFunction};
 
-use crate::synthesis::{MICRO, net_power};
+use crate::drives::{MICRO, net_power};
 use model::flow::Flow;
 use model::grid_shape::GridShape;
 use model::interval::Interval;
-use model::plant::{GridPlant, STATES};
+use model::plant::{Plant, STATES};
 use model::spec::Spec;
 
 /// Set-points tried in a band, its ends included.
@@ -25,13 +25,13 @@ const PRESSES: [f64; 5] = [0.6, 0.8, 1.0, 1.25, 1.6];
 /// Times tried, in periods.
 const PERIODS: [f64; 2] = [1.0, 2.0];
 
-/// Laws for set-points in a band of frequency deviation \[µHz\], the most central first.
+/// Pieces for set-points in a band of frequency deviation \[µHz\], the most central first.
 pub fn candidates(
     spec: &Spec,
     shape: &GridShape<STATES>,
     band_uhz: [i32; 2],
 ) -> Vec<AffineFunction> {
-    let (a, b) = GridPlant::new(spec).matrices();
+    let (a, b) = Plant::new(spec).matrices();
     let [low, high] = band_uhz.map(f64::from);
     let mut found = Vec::new();
     for periods in PERIODS {

@@ -1,17 +1,18 @@
 //! The event: the loss begins between two ticks, and nobody knows where.
 //!
-//! The first tick after the event comes a time δ in `[0, tick)` later; until then the input is none (level 0). The
-//! states at that tick are a curve over δ for each initial state. It is cut into pieces; on each, the curve lies on the
-//! chord of its ends but for `h²/8 sup|x''|`.
+//! The first tick after the event comes a time δ in `[0, tick)` later; until then the input is none
+//! (level 0). The states at that tick are a curve over δ for each initial state. It is cut into
+//! pieces; on each, the curve lies on the chord of its ends but for `h²/8 sup|x''|`.
 
 use super::closed_loop::Model;
-use super::segment::Segment;
+use super::held_input::HeldInput;
 use super::zonotope::Zonotope;
 use model::flow::{apply, product, tube};
 use model::interval::Interval;
 use model::plant::STATES;
 
-/// Pieces of the curve over δ; with a tick of 0.1 s the chord then errs by less than 0.02 mHz and 0.02 MW.
+/// Pieces of the curve over δ; with a tick of 0.1 s the chord then errs by less than 0.02 mHz and
+/// 0.02 MW.
 const PIECES: u32 = 8;
 
 /// Sets that together hold every state at the first tick after the event, in the order of δ.
@@ -29,7 +30,7 @@ pub(super) fn first_tick(model: &Model) -> Vec<Zonotope> {
     let mut from = start.clone();
     let mut at = model::flow::Flow::identity();
     for piece in 1..=PIECES {
-        let segment = Segment::new(&model.a, &model.b, h * f64::from(piece));
+        let segment = HeldInput::new(&model.a, &model.b, h * f64::from(piece));
         let to = start.flown(&segment, drive);
         let flows = product(&within, &at.phi);
         let bend = product(&square, &flows);

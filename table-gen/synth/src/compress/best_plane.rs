@@ -1,7 +1,6 @@
 //! Which plane cuts a box of cells best: the one after which single leaves fit the most cells.
 
-use super::cells::LabelledCell;
-use super::tree::bounds;
+use super::cells::{LabelledCell, bounds};
 use model::plant::STATES;
 
 /// Leaf values that fit in a set of labels.
@@ -43,12 +42,12 @@ impl Histogram {
     }
 }
 
-/// Bits that an exception costs on top of saying where it is. Larger values ask for purer sides; between 2 and 8 the
-/// trees of the shipped specs differ by a few percent.
+/// Bits that an exception costs on top of saying where it is. Larger values ask for purer sides;
+/// between 2 and 8 the trees of the shipped specs differ by a few percent.
 const EXCEPTION_BITS: f64 = 2.0;
 
-/// Cost in bits of a side of which `fit` of `cells` cells accept the best label: to say which cells are exceptions (the
-/// entropy of the choice) and what they get instead.
+/// Cost in bits of a side of which `fit` of `cells` cells accept the best label: to say which cells
+/// are exceptions (the entropy of the choice) and what they get instead.
 fn cost(cells: u32, fit: u32) -> f64 {
     let (n, k) = (f64::from(cells), f64::from(fit));
     let m = n - k;
@@ -58,8 +57,8 @@ fn cost(cells: u32, fit: u32) -> f64 {
     m * (n / m).log2() + k * (n / k).log2() + EXCEPTION_BITS * m
 }
 
-/// The best plane through cells that no single label fits; `None` if all cells are one. With more `balance` the costlier
-/// side counts more: paths get shorter and trees larger.
+/// The best plane through cells that no single label fits; `None` if all cells are one. With more
+/// `balance` the costlier side counts more: paths get shorter and trees larger.
 pub fn best_plane(cells: &[LabelledCell], balance: f64) -> Option<Plane> {
     let histogram = Histogram::new(cells);
     let mut best: Option<(f64, Plane)> = None;

@@ -1,15 +1,17 @@
 //! For ever: a closed set of whole cells.
 //!
-//! Under C1, C2 and Hold a decision depends on the cell alone, so the cells that can be reached at decisions form a
-//! graph: from each cell, under the table's own entry, the estimate comes to lie in some box of cells a period later. Where
-//! commands act with a delay the cells are those of the prediction, and the bounds of f are those of the period in which the command acts
-//! ([`super::knowledge`]).
-//! The graph is explored from the cells in which No control can end. Being closed, it speaks for all times:
+//! Under C1, C2 and Hold a decision depends on the cell alone, so the cells that can be reached at
+//! decisions form a graph: from each cell, under the table's own entry, the estimate comes to lie
+//! in some box of cells a period later. Where commands act with a delay the cells are those of the
+//! prediction, and the bounds of f are those of the period in which the command acts
+//! ([`super::estimate_error`]). The graph is explored from the cells in which No control can end.
+//! Being closed, it speaks for all times:
 //!
 //! - every cell has an entry, no box leaves the grid;
-//! - within each period the frequency keeps to its bounds ([`super::segment`]);
+//! - within each period the frequency keeps to its bounds ([`super::held_input`]);
 //! - Hold leads to Hold only;
-//! - and the longest path of C1 and C2 cells is the worst number of periods until Hold ([`longest_path`]).
+//! - and the longest path of C1 and C2 cells is the worst number of periods until Hold
+//!   ([`longest_path`]).
 
 use firmware::phase::{Decision, Phase, PhaseState};
 use firmware::table::TableView;
@@ -18,10 +20,10 @@ use rayon::prelude::*;
 use super::cellset::CellSet;
 use super::closed_loop::Model;
 use super::longest_path::{Edge, Graph};
+use super::outcome::{Found, Outcome, Violation, missed_handover, visits};
 use super::path::PathStep;
 use super::regions::Regions;
 use super::successor::successor;
-use super::tally::{Found, Tally, Violation, missed_handover, visits};
 use model::interval::Interval;
 use model::plant::STATES;
 
@@ -43,7 +45,7 @@ struct Batch {
 }
 
 /// The exploration of cells.
-pub(super) struct Closed<'a> {
+pub(super) struct ClosedCells<'a> {
     pub(super) table: &'a TableView<'a>,
     pub(super) model: &'a Model,
     /// Cells and the real states in which a command that is decided there begins to act.
@@ -54,13 +56,14 @@ pub(super) struct Closed<'a> {
     pub(super) inner: Interval,
 }
 
-impl Closed<'_> {
-    /// Explores from the cells in which No control ends. `seed_path` gives the path of sets to such a cell.
+impl ClosedCells<'_> {
+    /// Explores from the cells in which No control ends. `seed_path` gives the path of sets to such
+    /// a cell.
     pub(super) fn run(
         &self,
         seeds: Vec<u32>,
         seed_path: &dyn Fn(u32) -> Vec<PathStep>,
-        tally: &mut Tally,
+        tally: &mut Outcome,
         go_on: &dyn Fn(f64) -> bool,
     ) -> Option<u64> {
         let grid = &self.table.header().grid;
@@ -111,7 +114,7 @@ impl Closed<'_> {
         graph: &Graph,
         layers: &[Vec<u32>],
         seed_path: &dyn Fn(u32) -> Vec<PathStep>,
-        tally: &mut Tally,
+        tally: &mut Outcome,
     ) {
         if let Some((cell, _)) = graph.hold_leaves_hold() {
             let what = "Hold leads to a cell that Hold does not cover".to_owned();
@@ -162,12 +165,13 @@ impl Closed<'_> {
         // Both cut at the same bands.
         let parts = self.real.within(&bounds).into_iter();
         for ((state, f), (_, from_f)) in parts.zip(self.from.within(&bounds)) {
-            let knowledge = &self.model.knowledge;
+            let knowledge = &self.model.known;
             let mut real = widened(&bounds, &knowledge.real);
             let mut from = widened(&bounds, &knowledge.before);
             real[firmware::units::AXIS_F] = f;
             from[firmware::units::AXIS_F] = from_f;
-            // The level and the run of the decision before do not matter to a decision that finds a law.
+            // The level and the run of the decision before do not matter to a decision that finds a
+            // law.
             let before = PhaseState {
                 phase: Phase::C1,
                 level: 0,
@@ -214,7 +218,7 @@ impl Closed<'_> {
         index: u32,
         real: &[Interval; STATES],
         phase: Phase,
-        drive: super::closed_loop::Drive,
+        drive: super::drive::Drive,
         batch: &mut Batch,
     ) {
         let range = self.model.period.frequency(real, drive);
@@ -295,7 +299,7 @@ impl Closed<'_> {
             phase: next.phase,
             level: next.level,
             cell: Some(cell.0),
-            set: widened(&bounds, &self.model.knowledge.real)[firmware::units::AXIS_F],
+            set: widened(&bounds, &self.model.known.real)[firmware::units::AXIS_F],
         })
     }
 }
@@ -314,7 +318,7 @@ fn widened(bounds: &[(i32, i32); STATES], error: &[f64; STATES]) -> [Interval; S
     })
 }
 
-fn absorb(tally: &mut Tally, batch: &Batch) {
+fn absorb(tally: &mut Outcome, batch: &Batch) {
     tally.lookups += batch.lookups;
     tally.worst_visits = tally.worst_visits.max(batch.worst_visits);
     if let Some(range) = batch.range {

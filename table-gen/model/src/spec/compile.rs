@@ -17,9 +17,10 @@
 //! Bounds add up: the two reach steps follow each other, and the spec bounds their sum. Everything
 //! else is refused with the sub-formula that no game plays.
 
-use super::formula::{Comparison, Formula, Interval, Signal};
-use crate::spec::Spec;
 use serde::Serialize;
+
+use super::Spec;
+use crate::logic::{Comparison, Formula, Interval, Signal};
 
 /// What a formula asks of a spec; `None` leaves the spec's own value.
 #[derive(Debug, Clone, PartialEq, Default, Serialize)]
@@ -327,8 +328,8 @@ impl Compiled {
 
 #[cfg(test)]
 mod tests {
-    use super::super::parse;
     use super::*;
+    use crate::logic::parse;
 
     fn paper() -> Spec {
         Spec::load("paper-bi", &[]).unwrap()

@@ -1,16 +1,19 @@
-//! A stretch of time with a held input: where the state is at its end, and where the frequency is in between.
+//! A stretch of time with a held input: where the state is at its end, and where the frequency is
+//! in between.
 //!
-//! Write v = m + d(t) with |d| <= r. The part driven by the start and m is `y(s) = φ(s)·x + γ(s) m`, where φ and γ are
-//! the frequency's row of the flow; the part driven by d is at most `r a(s)`, a(s) = ∫ |e_f exp(A σ) b| dσ over
-//! [0, s]. The stretch is cut into steps of length h. Within a step that starts at s_k
+//! Write v = m + d(t) with |d| <= r. The part driven by the start and m is `y(s) = φ(s)·x + γ(s)
+//! m`, where φ and γ are the frequency's row of the flow; the part driven by d is at most `r a(s)`,
+//! a(s) = ∫ |e_f exp(A σ) b| dσ over [0, s]. The stretch is cut into steps of length h. Within a
+//! step that starts at s_k
 //!
-//! - y differs from its chord by at most `h²/8 sup|y''|`, with `y'' = e_f A² Φ(s) x + e_f A Φ(s) b m`;
+//! - y differs from its chord by at most `h²/8 sup|y''|`, with `y'' = e_f A² Φ(s) x + e_f A Φ(s) b
+//!   m`;
 //! - a(s) lies below the line from a(s_k) with the slope `sup |e_f exp(A σ) b|` over the step.
 //!
-//! So both bounds of f are lines plus a constant, extreme at the step's ends: the excess over the real range is of
-//! second order in h.
+//! So both bounds of f are lines plus a constant, extreme at the step's ends: the excess over the
+//! real range is of second order in h.
 
-use super::closed_loop::Drive;
+use super::drive::Drive;
 use model::flow::{Flow, Matrix, Vector, absolute_integral, apply, product, tube};
 use model::interval::Interval;
 use model::plant::STATES;
@@ -60,7 +63,7 @@ struct Step {
 
 /// A stretch of time with a held input.
 #[derive(Debug, Clone)]
-pub(crate) struct Segment {
+pub(crate) struct HeldInput {
     /// Φ and Γ over the whole stretch.
     pub(crate) flow: Flow<STATES>,
     /// `∫ |exp(A s) b| ds` over the stretch, rounded up.
@@ -70,7 +73,7 @@ pub(crate) struct Segment {
     end_gamma: Interval,
 }
 
-impl Segment {
+impl HeldInput {
     /// The stretch of this length \[s\] of `x' = A x + b v`.
     pub(crate) fn new(a: &Matrix<STATES>, b: &Vector<STATES>, length_s: f64) -> Self {
         let count = (length_s / STEP_S_MAX).ceil().max(1.0) as u32;
@@ -129,7 +132,8 @@ impl Segment {
             for (curvature, magnitude) in step.curvature.iter().zip(&magnitude) {
                 bend += curvature * magnitude;
             }
-            // Five products and five sums of non-negative numbers: relative error below 12 roundings.
+            // Five products and five sums of non-negative numbers: relative error below 12
+            // roundings.
             let bend = bend * (1.0 + 12.0 * f64::EPSILON);
             let wide = |at: Interval, absolute: f64| {
                 let radius = (bend + (drive.radius * absolute).next_up()).next_up();
@@ -146,7 +150,8 @@ impl Segment {
     }
 }
 
-/// a at the end of a step: exact where the integrand keeps its sign, else the largest magnitude times the length.
+/// a at the end of a step: exact where the integrand keeps its sign, else the largest magnitude
+/// times the length.
 fn next_absolute(
     a: &Matrix<STATES>,
     b: &Vector<STATES>,
@@ -179,7 +184,7 @@ mod tests {
     #[test]
     fn the_range_of_a_decay_is_known() {
         let (a, b) = decay();
-        let segment = Segment::new(&a, &b, 1.0);
+        let segment = HeldInput::new(&a, &b, 1.0);
         let mut set = [Interval::ZERO; STATES];
         set[0] = Interval::point(2.0);
         let still = Drive {
@@ -196,7 +201,7 @@ mod tests {
     #[test]
     fn a_varying_drive_widens_the_range_by_its_integral() {
         let (a, b) = decay();
-        let segment = Segment::new(&a, &b, 1.0);
+        let segment = HeldInput::new(&a, &b, 1.0);
         let set = [Interval::ZERO; STATES];
         let range = segment.frequency(
             &set,

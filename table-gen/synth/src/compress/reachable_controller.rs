@@ -1,11 +1,13 @@
 //! `table.domain = "reachable"`: only what the closed loop asks for.
 //!
-//! A simple controller is fixed first: the best affine law wherever the game, ranked by that law,
-//! allows it, else the nearest allowed level. The closed loop with it is explored; its cells must
-//! be covered and get the controller's very levels, or, where whole cells were explored, any
-//! allowed level whose box stays among them: so the loop stays within what was explored. All other
-//! cells are free, as long as no answer is wrong: a cell may be covered if the answer there is one
-//! that the game allows. So both parts shrink to a few bytes.
+//! A simple controller is fixed first. It takes the level of the best affine piece where the game,
+//! ranked by that piece, allows it, and the nearest allowed level elsewhere. Then its closed loop is
+//! explored.
+//!
+//! The explored cells must be covered. They keep the controller's level; where whole cells were
+//! explored, any allowed level will do whose box stays among them. So the loop stays within what
+//! was explored. All other cells are free: they may be covered if the answer there is one that the
+//! game allows. So both parts shrink to a few bytes.
 
 use firmware::grid::Cell;
 use firmware::table::{AffineFunction, Law};
@@ -15,8 +17,8 @@ use super::CompressError;
 use super::cells::LabelledCell;
 use super::encode::encode_inputs;
 use super::inputs::{CompressedInputs, InputsTask};
-use super::law_set::{LawSet, choose_laws};
 use super::membership::{DomainPart, Predicates, describe};
+use super::piece_set::{PieceSet, choose_pieces};
 use super::tree::build;
 use crate::abstraction::Abstraction;
 use crate::emit::{EncodedLaw, dense};
@@ -41,7 +43,7 @@ pub struct Controller {
     /// What the game allows, ranked by the controller's first law.
     pub solution: Solution,
     /// The affine laws.
-    pub laws: LawSet,
+    pub laws: PieceSet,
     /// Worst-case steps.
     pub steps: u16,
 }
@@ -57,7 +59,7 @@ impl Controller {
         candidates: &[AffineFunction],
     ) -> Result<Self, CompressError> {
         let levels = task.abstraction.inputs() as u8;
-        let laws = choose_laws(candidates, levels, &task.cells(task.solution));
+        let laws = choose_pieces(candidates, levels, &task.cells(task.solution));
         let solution = match task.target {
             Some(target) if task.rounds > 0 => task.ranked_by(&laws, target)?,
             _ => task.solution.clone(),
@@ -73,7 +75,7 @@ impl Controller {
 
     /// The level of the controller at a cell, of those allowed.
     fn level(&self, cell: [u16; STATES], allowed: u32) -> u8 {
-        let wanted = match self.laws.laws.first() {
+        let wanted = match self.laws.pieces.first() {
             Some(law) => law.level(Cell(cell), self.laws.levels),
             None => 0,
         };
@@ -123,7 +125,7 @@ impl Controller {
                 }
             })
             .collect();
-        let (low, high) = super::tree::bounds(&cells);
+        let (low, high) = super::cells::bounds(&cells);
         let tree = build(&mut cells, depth_max, 0.0, &|common, cells| {
             self.laws.choose(common, cells)
         });
@@ -154,7 +156,7 @@ impl Controller {
         if !everywhere && !asked.is_empty() {
             part.confine(low, high, shape.count)?;
         }
-        let bytes = encode_inputs(&tree, &laws.laws)?;
+        let bytes = encode_inputs(&tree, &laws.pieces)?;
         let inputs = CompressedInputs {
             tree,
             laws,

@@ -1,13 +1,14 @@
 //! Forward exploration in time with tight sets, over a horizon.
 //!
-//! A node is a tick, the phase machine's state and a tight set. At a tick the set is cut into the regions on which the
-//! machine decides alike; each part then flies for as long as the input is held: a tick in No control and Fixed, a
-//! period in C1, C2 and Hold. Nothing is rounded to cells. Where a layer grows past a limit, parts of one region and
-//! one decision are merged into a box.
+//! A node is a tick, the phase machine's state and a tight set. At a tick the set is cut into the
+//! regions on which the machine decides alike; each part then flies for as long as the input is
+//! held: a tick in No control and Fixed, a period in C1, C2 and Hold. Nothing is rounded to cells.
+//! Where a layer grows past a limit, parts of one region and one decision are merged into a box.
 //!
-//! Where commands act with a delay, a set after the trigger is that of the real states in which the tick's command begins to act: at the
-//! trigger the set flies over the delay with nothing acting, and from then on what is decided on lies within the prediction's error of
-//! it ([`super::knowledge`]).
+//! Where commands act with a delay, a set after the trigger is that of the real states in which the
+//! tick's command begins to act: at the trigger the set flies over the delay with nothing acting,
+//! and from then on what is decided on lies within the prediction's error of it
+//! ([`super::estimate_error`]).
 
 use std::collections::{BTreeMap, HashMap, HashSet};
 
@@ -16,11 +17,11 @@ use firmware::table::TableView;
 use firmware::units::State;
 
 use super::closed_loop::Model;
-use super::event;
+use super::first_tick;
+use super::held_input::Linear;
+use super::outcome::{Outcome, Violation, missed_handover};
 use super::path::{PathStep, Traces};
 use super::regions::{Part, Regions};
-use super::segment::Linear;
-use super::tally::{Tally, Violation, missed_handover};
 use super::zonotope::Zonotope;
 use model::plant::STATES;
 
@@ -32,7 +33,8 @@ const NODES_MAX: usize = 4_000_000;
 /// How long the present excursion lasts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 struct Age {
-    /// Tick before the one at which I1 (or, from Fixed, I2) was found left; `None` outside an excursion.
+    /// Tick before the one at which I1 (or, from Fixed, I2) was found left; `None` outside an
+    /// excursion.
     since: Option<u32>,
     /// Whether I2 has not been reached since the event.
     first: bool,
@@ -60,7 +62,7 @@ struct Decided {
 }
 
 /// The exploration.
-pub(super) struct Timed<'a> {
+pub(super) struct TightSets<'a> {
     table: &'a TableView<'a>,
     model: &'a Model,
     /// The real states by what is measured of them: No control.
@@ -68,7 +70,7 @@ pub(super) struct Timed<'a> {
     /// The real states in which a command begins to act by what is decided on.
     regions: &'a Regions,
     traces: Traces,
-    tally: Tally,
+    tally: Outcome,
     cells: HashSet<(Phase, u32)>,
     layers: BTreeMap<u32, Vec<Node>>,
     settle_ticks: u32,
@@ -76,7 +78,7 @@ pub(super) struct Timed<'a> {
 
 /// What an exploration found.
 pub(super) struct Explored {
-    pub(super) tally: Tally,
+    pub(super) tally: Outcome,
     /// Distinct (phase, cell) pairs in which a decision was made.
     pub(super) cells: u64,
     /// Nodes explored.
@@ -85,7 +87,7 @@ pub(super) struct Explored {
     pub(super) open_ticks: u32,
 }
 
-impl<'a> Timed<'a> {
+impl<'a> TightSets<'a> {
     /// An exploration from the event.
     pub(super) fn new(
         table: &'a TableView<'a>,
@@ -99,7 +101,7 @@ impl<'a> Timed<'a> {
             watched,
             regions,
             traces: Traces::default(),
-            tally: Tally::default(),
+            tally: Outcome::default(),
             cells: HashSet::new(),
             layers: BTreeMap::new(),
             settle_ticks,
@@ -159,7 +161,7 @@ impl<'a> Timed<'a> {
             c1_run: 0,
             c2_run: 0,
         };
-        let nodes = event::first_tick(self.model)
+        let nodes = first_tick::first_tick(self.model)
             .into_iter()
             .map(|set| Node {
                 trace,
@@ -211,7 +213,7 @@ impl<'a> Timed<'a> {
                 out.push(whole);
                 continue;
             }
-            if !watching || self.model.knowledge.delay.is_none() {
+            if !watching || self.model.known.delay.is_none() {
                 out.extend(self.regions.by_cell(&part.set).into_iter().map(ask));
                 continue;
             }
@@ -229,7 +231,7 @@ impl<'a> Timed<'a> {
 
     /// The states at the trigger a delay later; until then nothing acts, and f is bounded.
     fn ahead(&mut self, tick: u32, node: &Node, set: &Zonotope) -> Option<Zonotope> {
-        let delay = self.model.knowledge.delay.as_ref()?;
+        let delay = self.model.known.delay.as_ref()?;
         let step = PathStep {
             tick,
             phase: node.state.phase,

@@ -3,10 +3,10 @@
 use firmware::table::{Law, TableView};
 
 use super::inputs::InputsTask;
-use super::narrow::Controller;
+use super::reachable_controller::Controller;
 use super::{
-    CompressError, CompressedLaws, Context, INPUTS_DEPTH_MAX, VISITS_GOAL, deadbeat, finish,
-    reachable, target,
+    CompressError, CompressedLaws, Context, INPUTS_DEPTH_MAX, VISITS_GOAL, candidate_pieces,
+    finish, reachable, target,
 };
 use crate::abstraction::Abstraction;
 use crate::emit::{self, EmitError};
@@ -34,9 +34,9 @@ impl Context<'_, '_> {
             let Some(solved) = solved else { continue };
             let domain = solved.solution.winning_set(law == Law::Hold);
             let target = (law != Law::Hold).then(|| target(&solved.solution.ranks));
-            let guard = self.guard(law)?;
+            let guard = self.guard(law);
             let watch = self.watch(law);
-            let candidates = deadbeat::candidates(self.spec, shape, self.band(law));
+            let candidates = candidate_pieces::candidates(self.spec, shape, self.band(law));
             let task = InputsTask {
                 abstraction: self.abstraction,
                 target: target.as_ref(),
@@ -57,19 +57,19 @@ impl Context<'_, '_> {
         for (controller, ..) in &controllers {
             dense[controller.law as usize] = Some(controller.dense(self.abstraction));
         }
-        let image = emit::assemble(emit::head(self.spec, *self.grid)?, &dense)?;
+        let image = emit::assemble(emit::head(self.problem)?, &dense)?;
         drop(dense);
         let table = TableView::parse(&image).map_err(EmitError::Rejected)?;
-        let mut asked = reachable::reachable(self.spec, self.abstraction, &table)?;
+        let mut asked = reachable::reachable(self.problem, self.abstraction, &table)?;
         let mut best = self.narrow(&controllers, &asked)?;
         // The small controller, which keeps within the explored cells, may ask for fewer of them.
         for _ in 0..NARROWINGS {
             if !asked.closed {
                 break;
             }
-            let image = emit::assemble(emit::head(self.spec, *self.grid)?, &best.encoded())?;
+            let image = emit::assemble(emit::head(self.problem)?, &best.encoded())?;
             let table = TableView::parse(&image).map_err(EmitError::Rejected)?;
-            asked = reachable::reachable(self.spec, self.abstraction, &table)?;
+            asked = reachable::reachable(self.problem, self.abstraction, &table)?;
             let next = self.narrow(&controllers, &asked)?;
             if next.part_bytes() >= best.part_bytes() {
                 break;

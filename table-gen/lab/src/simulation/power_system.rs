@@ -1,7 +1,8 @@
-//! A grid that can be driven through the parts of a tick, and the linear one with its exact steps.
+//! A power system that can be driven through the parts of a tick, and the linear one with its exact
+//! steps.
 
 use super::monitor::{Knot, Monitor};
-use model::plant::{GridPlant, STATES};
+use model::plant::{Plant, STATES};
 use model::propagator::Propagator;
 
 /// A part of a tick; in each the fleet's power is constant.
@@ -18,31 +19,32 @@ pub enum Part {
 /// Lengths of the parts \[s\], in the order of [`Part`]; 0 for a part that does not exist.
 pub type PartLengths = [f64; 3];
 
-/// A grid in time.
-pub trait Grid {
+/// A power system in time.
+pub trait PowerSystem {
     /// Its state (f, g, l, p) \[Hz, GW\].
     fn state(&self) -> [f64; STATES];
 
-    /// Advances through a part of a tick under a constant power of the fleet \[GW\] and shows the frequency to the
-    /// monitor.
+    /// Advances through a part of a tick under a constant power of the fleet \[GW\] and shows the
+    /// frequency to the monitor.
     fn advance(&mut self, part: Part, from_s: f64, fleet_gw: f64, monitor: &mut Monitor);
 }
 
-/// The plant of the spec after a step of lost power: linear, so that a part of a tick is one exact step.
+/// The plant of the spec after a step of lost power: linear, so that a part of a tick is one exact
+/// step.
 #[derive(Debug, Clone, Copy)]
-pub struct LinearGrid {
-    plant: GridPlant,
+pub struct LinearSystem {
+    plant: Plant,
     steps: [Option<Propagator>; 3],
     lengths: PartLengths,
     loss_gw: f64,
     x: [f64; STATES],
 }
 
-impl LinearGrid {
-    /// A grid that loses a power \[GW\] at time 0. `tick` is the step over a whole tick; it serves when no delay splits
-    /// it.
+impl LinearSystem {
+    /// A plant that loses a power \[GW\] at time 0. `tick` is the step over a whole tick; it serves
+    /// when no delay splits it.
     pub fn new(
-        plant: GridPlant,
+        plant: Plant,
         tick: &Propagator,
         lengths: PartLengths,
         loss_gw: f64,
@@ -67,7 +69,7 @@ impl LinearGrid {
     }
 }
 
-impl Grid for LinearGrid {
+impl PowerSystem for LinearSystem {
     #[inline]
     fn state(&self) -> [f64; STATES] {
         self.x

@@ -45,12 +45,12 @@ impl Marks {
 
 /// The Hermite cubic between two knots.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Segment {
+pub(super) struct Arc {
     pub(super) from: Knot,
     pub(super) to: Knot,
 }
 
-impl Segment {
+impl Arc {
     pub(super) fn length(&self) -> f64 {
         self.to.time_s - self.from.time_s
     }
@@ -60,7 +60,8 @@ impl Segment {
         self.from.time_s + share * self.length()
     }
 
-    /// Least and greatest control value of the same curve in Bernstein form; the curve lies between them.
+    /// Least and greatest control value of the same curve in Bernstein form; the curve lies between
+    /// them.
     #[inline]
     pub(super) fn hull(&self) -> (f64, f64) {
         let third = self.length() / 3.0;
@@ -145,9 +146,9 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    fn segment(f: f64, df: f64, f1: f64, df1: f64) -> Segment {
+    fn segment(f: f64, df: f64, f1: f64, df1: f64) -> Arc {
         let knot = |time_s, f, df| Knot { time_s, f, df };
-        Segment {
+        Arc {
             from: knot(1.0, f, df),
             to: knot(3.0, f1, df1),
         }

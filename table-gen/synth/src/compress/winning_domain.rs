@@ -1,9 +1,11 @@
-//! `table.domain = "winning"`: laws that cover every winning cell, or all but what the options allow to give up.
+//! `table.domain = "winning"`: laws that cover every winning cell, or all but what the options
+//! allow to give up.
 //!
-//! The phase machine asks C2 only where f lies in I1; outside it C1 decides, also on the way to I2. So where both laws
-//! exist and nothing is to be held, C2's part needs entries in I1 alone: its game is played with C1's answers fixed
-//! everywhere else. Cells that I1 cuts belong to both: they are ranked by C1's answer, and C2 may give any input that
-//! lowers that rank as well. Where this does not win, and with `stay`, every law covers its own winning cells.
+//! The phase machine asks C2 only where f lies in I1; outside it C1 decides, also on the way to I2.
+//! So where both laws exist and nothing is to be held, C2's part needs entries in I1 alone: its
+//! game is played with C1's answers fixed everywhere else. Cells that I1 cuts belong to both: they
+//! are ranked by C1's answer, and C2 may give any input that lowers that rank as well. Where this
+//! does not win, and with `stay`, every law covers its own winning cells.
 
 use firmware::grid::Cell;
 use firmware::table::Law;
@@ -14,8 +16,8 @@ use super::domain::{DEPTH_MAX, GIVE_UP_ONE_IN, Play};
 use super::inputs::{CompressedInputs, InputsTask};
 use super::membership::{Predicates, describe};
 use super::{
-    CompressError, CompressedLaw, CompressedLaws, Context, INPUTS_DEPTH_MAX, VISITS_GOAL, deadbeat,
-    finish, target,
+    CompressError, CompressedLaw, CompressedLaws, Context, INPUTS_DEPTH_MAX, VISITS_GOAL,
+    candidate_pieces, finish, target,
 };
 use crate::abstraction::Abstraction;
 use crate::game::Solution;
@@ -66,7 +68,8 @@ impl Context<'_, '_> {
         let mut done = Vec::new();
         // Cells at which a law later in the chain, or Fixed, answers.
         let mut covered = BitSet::new(self.abstraction.shape().cells());
-        // Backwards from where the event ends: a law that gives cells up shrinks the target of the one before it.
+        // Backwards from where the event ends: a law that gives cells up shrinks the target of the
+        // one before it.
         for (law, solved) in [
             (Law::Hold, synthesis.hold.as_ref()),
             (Law::C2, synthesis.c2.as_ref()),
@@ -92,7 +95,7 @@ impl Context<'_, '_> {
     ) -> Result<Option<CompressedLaws>, CompressError> {
         let outer = target(&synthesis.c1.solution.ranks);
         let inner = target(&c2.solution.ranks);
-        let guard = self.guard(Law::C2)?;
+        let guard = self.guard(Law::C2);
         let watch = self.watch(Law::C2);
         let all = u32::MAX >> (u32::BITS - self.abstraction.inputs() as u32);
         let mut asked = c2.solution.winning_set(false);
@@ -137,7 +140,8 @@ impl Context<'_, '_> {
         Ok(None)
     }
 
-    /// C2 for the cells of I1 that are asked of it, beside a finished C1; `solution` wins everywhere.
+    /// C2 for the cells of I1 that are asked of it, beside a finished C1; `solution` wins
+    /// everywhere.
     fn beside(
         &self,
         c1: Made,
@@ -146,7 +150,7 @@ impl Context<'_, '_> {
         mut asked: BitSet,
         solution: &Solution,
     ) -> Result<CompressedLaws, CompressError> {
-        let guard = self.guard(Law::C2)?;
+        let guard = self.guard(Law::C2);
         let watch = self.watch(Law::C2);
         let mut everywhere = asked.clone();
         everywhere.add(&c1.cells);
@@ -162,7 +166,7 @@ impl Context<'_, '_> {
             .filter(|index| !inner.contains(*index))
             .map(|index| (shape.cell(index).map(|i| i as u16), asked.contains(index)));
         let part = describe(cells, count, &Predicates::default(), 0, DEPTH_MAX)?;
-        let candidates = deadbeat::candidates(self.spec, shape, self.band(Law::C2));
+        let candidates = candidate_pieces::candidates(self.spec, shape, self.band(Law::C2));
         let choice = |_: usize, cell: [u32; STATES]| c1.choice(cell);
         let inputs = InputsTask {
             abstraction: self.abstraction,
@@ -184,17 +188,19 @@ impl Context<'_, '_> {
         })
     }
 
-    /// Whether C2 may be asked, for each cell of f: some of its frequencies lie in I1 and not in I2.
+    /// Whether C2 may be asked, for each cell of f: some of its frequencies lie in I1 and not in
+    /// I2.
     fn asked_of_c2(&self) -> Vec<bool> {
         let [outer_low, outer_high] = self.spec.requirements.outer_micro();
         let [inner_low, inner_high] = self.spec.requirements.inner_micro();
         let edge = |f: i64| {
-            i64::from(self.grid.lower_edge()[AXIS_F]) + i64::from(self.grid.width()[AXIS_F]) * f
+            i64::from(self.problem.grid.lower_edge()[AXIS_F])
+                + i64::from(self.problem.grid.width()[AXIS_F]) * f
         };
         let meets = |f: i64, low: i32, high: i32| {
             edge(f).max(i64::from(low)) <= (edge(f + 1) - 1).min(i64::from(high))
         };
-        (0..i64::from(self.grid.count()[AXIS_F]))
+        (0..i64::from(self.problem.grid.count()[AXIS_F]))
             .map(|f| {
                 meets(f, outer_low, inner_low.saturating_sub(1))
                     || meets(f, inner_high.saturating_add(1), outer_high)
@@ -202,8 +208,8 @@ impl Context<'_, '_> {
             .collect()
     }
 
-    /// A law that covers its own winning cells; `covered` are those at which a later law or Fixed answers,
-    /// and `within` tells whether the law must lead to those of them.
+    /// A law that covers its own winning cells; `covered` are those at which a later law or Fixed
+    /// answers, and `within` tells whether the law must lead to those of them.
     fn law(
         &self,
         law: Law,
@@ -211,7 +217,7 @@ impl Context<'_, '_> {
         covered: &BitSet,
         within: bool,
     ) -> Result<Made, CompressError> {
-        let guard = self.guard(law)?;
+        let guard = self.guard(law);
         let watch = self.watch(law);
         let target = (law != Law::Hold).then(|| {
             let mut target = target(&solved.solution.ranks);
@@ -220,7 +226,8 @@ impl Context<'_, '_> {
             }
             target
         });
-        // Cells that no decision brings to this law: a later one answers there, or f is in I2 and Fixed does.
+        // Cells that no decision brings to this law: a later one answers there, or f is in I2 and
+        // Fixed does.
         let mut unasked = covered.clone();
         if let Some(target) = &target {
             unasked.keep(target);
@@ -237,7 +244,7 @@ impl Context<'_, '_> {
         // Beside C2, C1 had better aim at I2 as well: C2 has less to put right.
         let beside = law == Law::C1 && within && !self.spec.requirements.stay;
         let band = self.band(if beside { Law::C2 } else { law });
-        let candidates = deadbeat::candidates(self.spec, self.abstraction.shape(), band);
+        let candidates = candidate_pieces::candidates(self.spec, self.abstraction.shape(), band);
         let inputs = InputsTask {
             abstraction: self.abstraction,
             target: target.as_ref(),
