@@ -12,8 +12,8 @@
 //! advances nothing.
 //!
 //! ## Fit
-//! When it starts, a charger compares itself with what the proof of its table assumed ([`misfits`]).
-//! Where it is something else it runs the droop and says so at every tick.
+//! When it starts, a charger compares itself with what the proof of its table assumed
+//! ([`misfits`]). Where it is something else it runs the droop and says so at every tick.
 //!
 //! ## Energy
 //! Nothing is energised before a frequency has been believed and the delay of [`StartDelay`] has

@@ -238,8 +238,8 @@ fn the_record_of_2019_is_explained_and_answered() {
         }
     }
     // The same from the plant's equation alone: w = p - D f - 2H f', on average over the last 20 s,
-    // 40 s and more after the onset, when the limited governors give all that they have (1 GW; their
-    // lag still lacks 3 %). A step more or less of the walk at the ends is 0.03 GW.
+    // 40 s and more after the onset, when the limited governors give all that they have (1 GW;
+    // their lag still lacks 3 %). A step more or less of the walk at the ends is 0.03 GW.
     let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len() as f64;
     let f_hz = |at: usize| found.recorded[at].1 - 50.0;
     let last = found.recorded.len() - 1;

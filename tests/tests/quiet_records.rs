@@ -45,9 +45,9 @@ fn ripple(second: usize) -> f64 {
     0.001 * (second as f64 * 12.9898).sin()
 }
 
-/// 49.9 down to 49.63 Hz in an hour and back. The law is monotone in a slow f: each of the at most 21
-/// levels is passed once on the way down and once on the way up. A ripple of 2 mHz in all moves the
-/// target by less than the smallest change, so that no level toggles.
+/// 49.9 down to 49.63 Hz in an hour and back. The law is monotone in a slow f: each of the at most
+/// 21 levels is passed once on the way down and once on the way up. A ripple of 2 mHz in all moves
+/// the target by less than the smallest change, so that no level toggles.
 #[test]
 fn a_slow_drift_passes_each_level_once() {
     let down = |second: usize| 49.9 - 0.27 * second as f64 / 3600.0;

@@ -8,8 +8,8 @@
 //! can. Some cars pause by themselves for a while when their set-point changes. Everything is in
 //! ppm of the charger's swing: 0 is full charging, a million is the whole response.
 //!
-//! The one model of a car: the fleet and the scorecard use it. A car of [`CarConfig::IDEAL`] follows
-//! at once.
+//! The one model of a car: the fleet and the scorecard use it. A car of [`CarConfig::IDEAL`]
+//! follows at once.
 
 use std::collections::VecDeque;
 
@@ -121,8 +121,8 @@ impl Car {
         self.config == CarConfig::IDEAL
     }
 
-    /// Takes the set-point of a tick \[ppm\] at a time \[ms\]; the response at that time \[ppm\]. Times
-    /// may not fall.
+    /// Takes the set-point of a tick \[ppm\] at a time \[ms\]; the response at that time \[ppm\].
+    /// Times may not fall.
     pub fn tick(&mut self, set_point_ppm: i64, now_ms: u32) -> i64 {
         if self.is_ideal() {
             return set_point_ppm;

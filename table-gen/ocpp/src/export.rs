@@ -2,10 +2,10 @@
 //!
 //! | message | says | cannot say |
 //! |---|---|---|
-//! | `SetChargingProfile`, `LocalFrequency` | draw, droop and swing of a charger \[W, Hz\] | the event's end |
-//! | `SetDERControl`, `FreqDroop` | droop, time of the response | the swing; "no response to a rise" |
-//! | `SetDERControl`, `EnterService` | the event's end | that the way back stands still while f is low |
-//! | `SetDERControl`, `FreqWatt` with `hysteresis` | droop and the event's end once more | the same |
+//! | `SetChargingProfile`, `LocalFrequency` | draw, droop, swing \[W, Hz\] | the event's end |
+//! | `SetDERControl`, `FreqDroop` | droop, response time | the swing; "none to a rise" |
+//! | `SetDERControl`, `EnterService` | the event's end | that it stands still while f is low |
+//! | `SetDERControl`, `FreqWatt` with `hysteresis` | droop and event's end once more | the same |
 
 use serde::Serialize;
 use serde_json::{Value, json};

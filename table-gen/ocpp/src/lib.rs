@@ -4,7 +4,7 @@
 //! |---|---|
 //! | [`curve`] | the frequency-watt curve: checked once, then interpolated |
 //! | [`messages`] | the messages' fields, by the published schemas |
-//! | [`fallback`] | what is said in OCPP: droop, swing, the event's end; from a spec, and into one |
+//! | [`fallback`] | what is said in OCPP: droop, swing, the event's end; to and from a spec |
 //! | [`export`] | a fallback to messages |
 //! | [`import`] | messages to a fallback |
 //! | [`container`] | the table, which OCPP cannot say: a signed container in `DataTransfer` |

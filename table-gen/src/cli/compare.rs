@@ -43,7 +43,8 @@ pub(super) struct CompareArgs {
     /// Inertias H [GW s/Hz], one or more; default: the spec's
     #[arg(long, value_name = "H,H,...", allow_hyphen_values = true)]
     inertia: Option<Numbers>,
-    /// Chargers of the fleet that droop and table run on; together they have the power of the spec's fleet
+    /// Chargers of the fleet that droop and table run on; together they have the power of the
+    /// spec's fleet
     #[arg(long, value_name = "N", default_value_t = CHARGERS)]
     chargers: usize,
     /// Deviation at which the limit, everything at once, responds [Hz]

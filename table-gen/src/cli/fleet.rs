@@ -36,7 +36,8 @@ pub(super) struct FleetArgs {
         allow_negative_numbers = true
     )]
     duration_s: f64,
-    /// Bound on the error of each charger's frequency meter, drawn each tick [Hz]; default: the spec's
+    /// Bound on the error of each charger's frequency meter, drawn each tick [Hz]; default: the
+    /// spec's
     #[arg(long, value_name = "HZ", allow_negative_numbers = true)]
     noise_hz: Option<f64>,
     /// Share of chargers that never respond
@@ -93,7 +94,8 @@ struct FleetReport<'r> {
     changes_per_charger: f64,
     contactor_operations_per_charger: f64,
     outside_proven_hull_s: Option<f64>,
-    /// Largest and mean distance of the response from what one firmware that is told the state asks for.
+    /// Largest and mean distance of the response from what one firmware that is told the state asks
+    /// for.
     gap_max: f64,
     gap_mean: f64,
 }

@@ -59,7 +59,8 @@ enum Command {
     Synth(synth::SynthArgs),
     /// Run the grid with no response, the baseline droop or the firmware on a table
     Simulate(simulate::SimulateArgs),
-    /// The scorecard: a table beside no response, the droop and full response at once, over losses and inertias
+    /// The scorecard: a table beside no response, the droop and full response at once, over losses
+    /// and inertias
     Compare(compare::CompareArgs),
     /// A recorded event with the fleet responding: what the frequency would have been
     Counterfactual(counterfactual::CounterfactualArgs),

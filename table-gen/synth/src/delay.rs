@@ -5,7 +5,8 @@
 //! prediction ([`firmware::prediction`]); the games are played in its coordinate,
 //!
 //! ```text
-//! ξ(t) = Φ_δ x̂(t) + Σ_j G_j u(t - j tick) + Γ_δ (-w₀) + r        x̂ = x + ε,  |ε| <= e,  w₀ the middle of the loss band
+//! ξ(t) = Φ_δ x̂(t) + Σ_j G_j u(t - j tick) + Γ_δ (-w₀) + r
+//! x̂ = x + ε,  |ε| <= e,  w₀ the middle of the loss band
 //! ```
 //!
 //! with r the error of the coefficients, |r| <= ρ. Write the net power as P u - w₀ + d: what it is
@@ -13,21 +14,23 @@
 //! participation). Then, with b the direction of the drive,
 //!
 //! ```text
-//! x(t+δ) = ξ(t) - Φ_δ ε - r + ∫ exp(A (t+δ-s)) b d(s) ds        over [t, t+δ]                              (1)
+//! x(t+δ) = ξ(t) - Φ_δ ε - r + ∫ exp(A (t+δ-s)) b d(s) ds        over [t, t+δ]        (1)
 //! ```
 //!
 //! and, as x(t+τ+δ) = Φ_τ x(t+δ) + Γ_τ (P u - w₀) + ∫ exp(A (t+τ+δ-s)) b d(s) ds over [t+δ, t+τ+δ],
 //! (1) at t and at t+τ give
 //!
 //! ```text
-//! ξ(t+τ) = Φ_τ ξ(t) + Γ_τ (P u - w₀) - Φ_{τ+δ} ε - Φ_τ r + Φ_δ ε' + r' + ∫ exp(A σ) b d(t+τ+δ-σ) dσ     over [δ, τ+δ]    (2)
+//! ξ(t+τ) = Φ_τ ξ(t) + Γ_τ (P u - w₀) - Φ_{τ+δ} ε - Φ_τ r + Φ_δ ε' + r'
+//!          + ∫ exp(A σ) b d(t+τ+δ-σ) dσ        over [δ, τ+δ]        (2)
 //! ```
 //!
 //! for what d does in [t+τ, t+τ+δ] enters x(t+τ+δ) and ξ(t+τ) is predicted without it: it cancels.
 //! So the successor's box is
 //!
 //! ```text
-//! Φ_τ cell + Γ_τ (P u - w₀)  ±  ( |Φ_{τ+δ}| e + |Φ_δ| e + (|Φ_τ| + 1) ρ + ∫ |exp(A σ) b| |d| dσ over [δ, τ+δ] )
+//! Φ_τ cell + Γ_τ (P u - w₀)
+//!     ±  ( |Φ_{τ+δ}| e + |Φ_δ| e + (|Φ_τ| + 1) ρ + ∫ |exp(A σ) b| |d| dσ over [δ, τ+δ] )
 //! ```
 //!
 //! In the integral, σ in [δ, τ] (if δ < τ) is the time under u itself, whose d is known to lie in

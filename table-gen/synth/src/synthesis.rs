@@ -4,7 +4,7 @@
 //! |---|---|---|---|
 //! | C1 | reach-avoid | whole cells in I1 | always |
 //! | C2 | reach-avoid | whole cells in I2 | if I2 is smaller than I1 |
-//! | Hold | safety | stay in whole cells in I2 | `stay = true`; then C2, or C1 if there is no C2, reaches Hold's kernel |
+//! | Hold | safety | stay in whole cells in I2 | with `stay`; the law before reaches its kernel |
 //!
 //! "Avoid" is every cell of which any part lies below containment. With a measurement error e, the
 //! cell is that of the estimate: the real frequency may lie e outside it, so bands shrink and

@@ -8,7 +8,7 @@
 //! which the adversary chooses. Then
 //!
 //! ```text
-//! ξ(t) = Φ_δ (x(t) + ε) + (response to the expected power of the commands under way) + r             |r| <= ρ
+//! ξ(t) = Φ_δ (x(t) + ε) + (response to the expected power of the commands under way) + r, |r| <= ρ
 //! x(t+δ) = Φ_δ x(t) + (the same response) + ∫ exp(A (t+δ-s)) b d(s) ds over [t, t+δ]
 //! ```
 //!
@@ -20,7 +20,8 @@
 //! in its own interval, later under unknown ones. So
 //!
 //! ```text
-//! ξ(t+τ) = Φ_τ (ξ(t) - r) + Γ_τ (expected power) + ∫ exp(A σ) b d dσ over [δ, δ+τ] - Φ_{δ+τ} ε + Φ_δ ε' + r'
+//! ξ(t+τ) = Φ_τ (ξ(t) - r) + Γ_τ (expected power) + ∫ exp(A σ) b d dσ over [δ, δ+τ]
+//!          - Φ_{δ+τ} ε + Φ_δ ε' + r'
 //! ```
 //!
 //! **ρ.** Each of the device's coefficients is compared with an enclosure of what it stands for.

@@ -10,7 +10,7 @@ use crate::steps::root;
 /// Most columns of a comment line; rustfmt does not break them.
 const COLUMNS_MAX: usize = 100;
 /// Folders with source, from the workspace's root.
-const FOLDERS: &[&str] = &["firmware", "tests"];
+const FOLDERS: &[&str] = &["firmware", "table-gen", "tests"];
 /// Folders that hold what a build writes.
 const BUILT: &[&str] = &["target", "corpus", "artifacts", "coverage"];
 

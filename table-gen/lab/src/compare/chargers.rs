@@ -1,10 +1,12 @@
-//! A fleet of control loops: each charger with its own clock, meter and delay, and nothing else of a charger.
+//! A fleet of control loops: each charger with its own clock, meter and delay, and nothing else of
+//! a charger.
 //!
-//! A tick of the table is cut into ten parts. Charger i decides in part i mod 10. Its command acts after its own delay,
-//! which is constant over a run; the delays are spread evenly over the spec's range. Its meter errs by a uniform error
-//! within the spec's bound, drawn anew each tick, and reads what f was a while ago: its own lag, spread
-//! evenly over the meter's. Its levels are shifted as its serial number says. What the fleet gives is a sum of whole ppm: it does not depend on the
-//! order of the chargers.
+//! A tick of the table is cut into ten parts. Charger i decides in part i mod 10. Its command acts
+//! after its own delay, which is constant over a run; the delays are spread evenly over the spec's
+//! range. Its meter errs by a uniform error within the spec's bound, drawn anew each tick, and
+//! reads what f was a while ago: its own lag, spread evenly over the meter's. Its levels are
+//! shifted as its serial number says. What the fleet gives is a sum of whole ppm: it does not
+//! depend on the order of the chargers.
 
 use std::collections::VecDeque;
 
@@ -24,7 +26,8 @@ use model::spec::Spec;
 pub const PARTS: usize = 10;
 /// Smallest change of a command that is counted \[ppm of full scale\].
 const COUNTED_PPM: i64 = 50_000;
-/// The golden ratio's fraction: its multiples fill the unit interval evenly, however many are taken.
+/// The golden ratio's fraction: its multiples fill the unit interval evenly, however many are
+/// taken.
 const GOLDEN: f64 = 0.618_033_988_749_894_9;
 
 /// The fleet.
@@ -106,7 +109,8 @@ pub struct Chargers<'t> {
     meter_uhz: f64,
     /// Deviations of the last parts \[µHz\], the latest first: as many as the longest lag needs.
     f_uhz: VecDeque<i32>,
-    /// Changes of the sum that are under way \[ppm\], by the part in which they act, modulo the length.
+    /// Changes of the sum that are under way \[ppm\], by the part in which they act, modulo the
+    /// length.
     under_way: Vec<i64>,
     part: usize,
     /// What acts now \[ppm, all chargers together\].
@@ -188,7 +192,8 @@ impl<'t> Chargers<'t> {
         }
     }
 
-    /// Changes of a charger's command by 5 % of full scale and more: on average, and the most of any.
+    /// Changes of a charger's command by 5 % of full scale and more: on average, and the most of
+    /// any.
     pub fn changes(&self) -> (f64, u32) {
         let changes = self.chargers.iter().map(|charger| charger.changes);
         let sum: u64 = changes.clone().map(u64::from).sum();

@@ -1,7 +1,8 @@
 //! The grid in time under one controller.
 //!
-//! The plant takes exact steps of a part of a tick, over each of which the fleet's power is constant. The chargers watch a
-//! quiet grid before the event. The limit responds between two steps, at the moment itself.
+//! The plant takes exact steps of a part of a tick, over each of which the fleet's power is
+//! constant. The chargers watch a quiet grid before the event. The limit responds between two
+//! steps, at the moment itself.
 
 use super::chargers::{Chargers, PARTS};
 use super::outcome::Outcome;
@@ -12,7 +13,8 @@ use model::plant::{Plant, STATES};
 use model::propagator::Propagator;
 use model::spec::Spec;
 
-/// Time for which the chargers watch the quiet grid before the event \[s\]; longer than any window of a law.
+/// Time for which the chargers watch the quiet grid before the event \[s\]; longer than any window
+/// of a law.
 const QUIET_S: f64 = 5.0;
 /// Time from which the ripple is measured \[s\].
 const RIPPLE_FROM_S: f64 = 60.0;
@@ -180,9 +182,9 @@ mod tests {
         assert_eq!((outcome.participation_gw_s, outcome.changes_most), (0.0, 0));
     }
 
-    /// An independent simulation that decides every 0.1 s: it responds up to a tick late, in which f
-    /// falls by at most 0.1 s of its slope, loss / 2H. Its nadir is lower by no more than that, half
-    /// a millihertz of rounding included.
+    /// An independent simulation that decides every 0.1 s: it responds up to a tick late, in which
+    /// f falls by at most 0.1 s of its slope, loss / 2H. Its nadir is lower by no more than that,
+    /// half a millihertz of rounding included.
     #[test]
     fn the_limit_is_what_an_independent_program_found() {
         for (loss_gw, nadir_hz) in [(0.6, 49.898), (1.8, 49.811), (2.0, 49.728), (2.2, 49.646)] {
@@ -199,7 +201,8 @@ mod tests {
         assert_eq!(nothing, course(0.3).without());
     }
 
-    /// All of 1.4 GW from the trigger on, less the time before it: 2 GW of loss pass -0.1 Hz after 0.43 s at most.
+    /// All of 1.4 GW from the trigger on, less the time before it: 2 GW of loss pass -0.1 Hz after
+    /// 0.43 s at most.
     #[test]
     fn what_was_given_is_an_energy() {
         let outcome = course(2.0).limit(-0.1);

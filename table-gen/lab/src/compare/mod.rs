@@ -1,11 +1,12 @@
-//! The scorecard: a table beside the droop, no response and the ideal one, at many losses and inertias.
+//! The scorecard: a table beside the droop, no response and the ideal one, at many losses and
+//! inertias.
 //!
 //! | controller | how it responds |
 //! |---|---|
 //! | none | not at all |
 //! | droop | a fleet of chargers, each with the spec's droop |
 //! | table | the same fleet, each with the firmware's control loop on the table |
-//! | limit | everything, at once and for good, at the moment f passes a trigger: what no real fleet beats by much |
+//! | limit | everything, at once and for good, when f passes a trigger: hardly to be beaten |
 //!
 //! | module | holds |
 //! |---|---|

@@ -1,8 +1,9 @@
 //! Where a table loses to the droop.
 //!
-//! A run of a fleet depends on the draw of its meters' errors. The mean of N errors, each uniform within ±e, has the
-//! standard deviation e / √(3 N), and an error of the mean moves f by no more than itself. So two numbers are called
-//! different where they are further apart than five such deviations of both runs, 5 e √(2 / (3 N)), and a microhertz.
+//! A run of a fleet depends on the draw of its meters' errors. The mean of N errors, each uniform
+//! within ±e, has the standard deviation e / √(3 N), and an error of the mean moves f by no more
+//! than itself. So two numbers are called different where they are further apart than five such
+//! deviations of both runs, 5 e √(2 / (3 N)), and a microhertz.
 
 use super::chargers::ChargersConfig;
 use super::{Controller, Row, Scorecard};

@@ -5,7 +5,8 @@
 //! with whatever limits the governors have. What is left is linear, with one step a sample:
 //!
 //! ```text
-//! f⁺ = a f + b (p - d)        d⁺ = d + q ξ        y = f + σ η        a = exp(-D h / 2H),  b = (1 - a) / D
+//! f⁺ = a f + b (p - d)        d⁺ = d + q ξ        y = f + σ η
+//! a = exp(-D h / 2H)          b = (1 - a) / D
 //! ```
 //!
 //! ξ and η standard normal; d is the missing power \[GW\], constant over a step, and p its mean

@@ -1,12 +1,12 @@
 //! A crowd: chargers with own clocks and own meters' errors, whose commands may act at any time
 //! between the least and the most delay.
 //!
-//! Time goes in parts of a tick. A charger with a clock of its own decides in one part of each tick.
-//! A command decided in part a may act from a + d₁ on and is replaced at the latest when the next one
-//! has been under way for d₂. So at part b a charger's response is any of the commands decided from
-//! the last one not after b - d₂ to the last one not after b - d₁, each time another if it likes.
-//! The crowd gives the mean of the least and the mean of the greatest: every response between them
-//! is one of a real fleet, with these very chargers.
+//! Time goes in parts of a tick. A charger with a clock of its own decides in one part of each
+//! tick. A command decided in part a may act from a + d₁ on and is replaced at the latest when the
+//! next one has been under way for d₂. So at part b a charger's response is any of the commands
+//! decided from the last one not after b - d₂ to the last one not after b - d₁, each time another
+//! if it likes. The crowd gives the mean of the least and the mean of the greatest: every response
+//! between them is one of a real fleet, with these very chargers.
 
 use firmware::control_loop::ControlLoop;
 use firmware::response::LevelOffset;
@@ -68,8 +68,8 @@ pub struct Crowd<'t> {
 }
 
 impl<'t> Crowd<'t> {
-    /// A crowd drawn: so many chargers on a grid that has been in a state for long. One crowd in four
-    /// has one clock.
+    /// A crowd drawn: so many chargers on a grid that has been in a state for long. One crowd in
+    /// four has one clock.
     pub fn draw(
         table: &TableView<'t>,
         number: usize,

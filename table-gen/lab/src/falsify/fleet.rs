@@ -1,8 +1,8 @@
 //! The search against a whole fleet: chargers, losses and a plant that are drawn, and an adversary
 //! who chooses what the fleet delivers at every moment.
 //!
-//! Of each trajectory are drawn: the inertia, governor gain and damping from the spec's bands (half of
-//! them at an end), the loss by its profile, the initial state, the crowd, and a strategy:
+//! Of each trajectory are drawn: the inertia, governor gain and damping from the spec's bands (half
+//! of them at an end), the loss by its profile, the initial state, the crowd, and a strategy:
 //!
 //! | strategy | the greatest response |
 //! |---|---|
@@ -12,8 +12,8 @@
 //! | bang-bang | for half of a period |
 //! | functional | by the sign of a linear functional of the state; the best so far is mutated |
 //!
-//! Every response lies within what the crowd's own chargers can give, and the error of participation
-//! goes the same way. So each trajectory is one of a real fleet.
+//! Every response lies within what the crowd's own chargers can give, and the error of
+//! participation goes the same way. So each trajectory is one of a real fleet.
 
 use firmware::table::TableView;
 use model::plant::{Plant, STATES};
@@ -368,8 +368,8 @@ impl<'s> Judge<'s> {
         }
     }
 
-    /// Takes f \[Hz\] at a time \[s\], with the time since which the loss stands \[s\]; the claim that is
-    /// broken.
+    /// Takes f \[Hz\] at a time \[s\], with the time since which the loss stands \[s\]; the claim
+    /// that is broken.
     fn judge(&mut self, time_s: f64, since_s: f64, f: f64) -> Option<ClaimName> {
         let requirements = &self.spec.requirements;
         if let Some(limit) = requirements.containment_hz {
@@ -413,8 +413,8 @@ mod tests {
         let stands = falsify(&bytes, &small, 20_000, 1).unwrap();
         assert_eq!(stands.violation, None);
         assert!(stands.smallest_margin_hz > 0.0 && stands.steps >= 20_000);
-        // 3.5 GW without a response take f to 50 - 3.5 * 0.436 = 48.5 Hz; with all of 1.4 GW at once
-        // to 50 - 2.1 * 0.436 = 49.08, which is below 49.5 too.
+        // 3.5 GW without a response take f to 50 - 3.5 * 0.436 = 48.5 Hz; with all of 1.4 GW at
+        // once to 50 - 2.1 * 0.436 = 49.08, which is below 49.5 too.
         let large = load("[0, 3.5]");
         let falls = falsify(&bytes, &large, 1_000_000, 1).unwrap();
         let real = falls.violation.unwrap();

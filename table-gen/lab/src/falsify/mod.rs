@@ -8,12 +8,13 @@
 //! |---|---|
 //! | [`trajectory`] | plant and firmware, from the event until a claim breaks |
 //! | [`adversaries`] | who chooses the disturbances |
-//! | [`crowd`] | chargers with own clocks and errors, whose commands act at any time within the delays |
+//! | [`crowd`] | chargers with own clocks and errors; commands act anywhere within the delays |
 //! | `fleet` | the search against a whole fleet, on a plant and losses that are drawn |
 //! | [`witness`] | for a verdict's failure: a real trajectory that shows it |
 //!
-//! Where a spec knows a fleet (own clocks, a range of delays, a band of the plant's parameters, or a
-//! response), the search is `fleet`'s. Else one charger stands for all, and the search takes turns between three kinds of trajectory:
+//! Where a spec knows a fleet (own clocks, a range of delays, a band of the plant's parameters, or
+//! a response), the search is `fleet`'s. Else one charger stands for all, and the search takes
+//! turns between three kinds of trajectory:
 //!
 //! | kind | chooses |
 //! |---|---|

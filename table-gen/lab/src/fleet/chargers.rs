@@ -1,8 +1,8 @@
 //! All chargers in time: whose tick it is, and what is under way.
 //!
-//! The chargers lie in ten slots, by the part of the tick in which they tick next. One whose clock is
-//! off by some ppm moves to the slot before or after now and then. Responses are summed as whole ppm,
-//! so that the result does not depend on the number of threads.
+//! The chargers lie in ten slots, by the part of the tick in which they tick next. One whose clock
+//! is off by some ppm moves to the slot before or after now and then. Responses are summed as whole
+//! ppm, so that the result does not depend on the number of threads.
 
 use std::collections::VecDeque;
 
@@ -131,7 +131,8 @@ fn build<'t>(spec: &Spec, table: &TableView<'t>, config: &FleetConfig) -> Vec<Ve
     let mut random = Pcg64::seed_from_u64(config.seed);
     let mut slots: Vec<Vec<Instance<'t>>> = (0..PARTS).map(|_| Vec::new()).collect();
     let failed = (config.failed_share * config.instances as f64).round() as usize;
-    // The failed ones are drawn without replacement: each of the rest fails with probability left / remaining.
+    // The failed ones are drawn without replacement: each of the rest fails with probability left /
+    // remaining.
     let mut failed_left = failed.min(config.instances);
     for index in 0..config.instances {
         let remaining = config.instances - index;

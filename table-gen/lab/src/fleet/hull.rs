@@ -2,7 +2,8 @@
 //!
 //! ## Derivation
 //! f is the frequency, T the tick, W the window of the slope, ε the bound on a meter's error, and
-//! \[λ₁, λ₂\] the lag of a meter. A charger that decides at time s has read, at its own ticks s - kT,
+//! \[λ₁, λ₂\] the lag of a meter. A charger that decides at time s has read, at its own ticks s -
+//! kT,
 //!
 //! ```text
 //! y(s - kT) = f(s - kT - λ) + e,    λ in [λ₁, λ₂],  |e| <= ε,   each time another
@@ -21,10 +22,10 @@
 //! ```
 //!
 //! A command lies less than the smallest change c from its target, and is 0 or 1 exactly where the
-//! target is. It acts from d after s until the next one acts, d in \[d₁, d₂\], each time another. So
-//! what acts at time t was decided in \[t - d₂ - T, t - d₁\], and each charger's response lies between
-//! the least V⁻ - c and the greatest V⁺ + c of that time. So does the mean over any number of
-//! chargers, which is the convex hull. Of a participation u the grid gets anything from
+//! target is. It acts from d after s until the next one acts, d in \[d₁, d₂\], each time another.
+//! So what acts at time t was decided in \[t - d₂ - T, t - d₁\], and each charger's response lies
+//! between the least V⁻ - c and the greatest V⁺ + c of that time. So does the mean over any number
+//! of chargers, which is the convex hull. Of a participation u the grid gets anything from
 //! u (1 - ρ) - α to u (1 + ρ) + α, at most everything.
 //!
 //! ## Time
@@ -382,8 +383,8 @@ mod tests {
         }
     }
 
-    /// The monitor can fail: a fleet that is a second later than assumed leaves the hull on each of a
-    /// few paths.
+    /// The monitor can fail: a fleet that is a second later than assumed leaves the hull on each of
+    /// a few paths.
     #[test]
     fn a_fleet_that_is_later_than_assumed_is_seen() {
         for seed in 0..5 {

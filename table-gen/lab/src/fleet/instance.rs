@@ -19,7 +19,8 @@ use model::spec::{Direction, Spec};
 const COUNTED_PPM: i64 = 50_000;
 /// A clock that is off by a ppm reads 50 Hz off by so much \[µHz\].
 const UHZ_PER_PPM: f64 = 50.0;
-/// Millionths: responses are counted in whole ppm of a charger's swing, so that sums do not depend on their order.
+/// Millionths: responses are counted in whole ppm of a charger's swing, so that sums do not depend
+/// on their order.
 const PPM: i64 = 1_000_000;
 
 /// What a charger did at a tick.

@@ -39,8 +39,8 @@ pub struct FleetMeasures {
     pub contactor_operations_per_charger: f64,
     /// The most of any charger.
     pub contactor_operations_max: u32,
-    /// Time in which the response lay outside of what the proof assumes of a fleet \[s\]; `null` for a
-    /// table by games, whose proof knows one participation.
+    /// Time in which the response lay outside of what the proof assumes of a fleet \[s\]; `null`
+    /// for a table by games, whose proof knows one participation.
     pub outside_proven_hull_s: Option<f64>,
     /// Farthest distance from it, as a share of the fleet.
     pub outside_proven_hull_by: Option<f64>,

@@ -4,14 +4,14 @@
 //! | module | holds |
 //! |---|---|
 //! | `config` | how many chargers, and what is wrong with them |
-//! | `hardware`, `instance` | one charger: the firmware's supervisor on its own hardware, and its car |
+//! | `hardware`, `instance` | one charger: the firmware on its own hardware, and its car |
 //! | `chargers` | all of them in time: whose tick it is, and what is under way |
 //! | [`hull`] | the response that the proof assumes, and for how long the fleet left it |
 //! | [`measure`] | what a fleet is judged by besides the frequency |
 //!
-//! A tick of the table is cut into ten parts. Each charger ticks in one of them, by its own clock, and
-//! sees the frequency of that moment; the power of the fleet is constant over a part, and the plant
-//! takes an exact step.
+//! A tick of the table is cut into ten parts. Each charger ticks in one of them, by its own clock,
+//! and sees the frequency of that moment; the power of the fleet is constant over a part, and the
+//! plant takes an exact step.
 //!
 //! The power of the fleet is the spec's whatever the number of instances: each stands for `chargers
 //! / instances` of them.

@@ -2,7 +2,7 @@
 //!
 //! | form | example |
 //! |---|---|
-//! | RFC 3339, and with a blank for the `T` | `2019-08-09T15:52:33Z`, `2019-08-09 15:52:33.5+01:00` |
+//! | RFC 3339, also with a blank | `2019-08-09T15:52:33Z`, `2019-08-09 15:52:33.5+01:00` |
 //! | the same with slashes | `2019/08/09 15:52:33` |
 //! | NESO since 2023, and Go programs | `2019-08-09 15:52:33 +0000 UTC` |
 //! | day first with points | `09.08.2019 15:52:33,5` |

@@ -7,7 +7,7 @@
 //!
 //! | in the record | what the meter reads |
 //! |---|---|
-//! | a single sample that is off by itself | that value at one tick; the line goes from its neighbour to its neighbour |
+//! | a single sample that is off by itself | that value at one tick, no longer |
 //! | a jump that lasts | the last value, then the new one |
 
 use core::num::NonZeroU16;

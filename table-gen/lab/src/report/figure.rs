@@ -141,7 +141,8 @@ pub struct Figure {
 }
 
 impl Figure {
-    /// Everything that is drawn, one value a line: kind, name, place on the axis and value for curves, and the ends of stretches and bands.
+    /// Everything that is drawn, one value a line: kind, name, place on the axis and value for
+    /// curves, and the ends of stretches and bands.
     pub fn csv(&self) -> String {
         let mut out = format!("kind,name,{},value\n", self.axis.column());
         // Writing to a string cannot fail.
@@ -170,8 +171,8 @@ impl Figure {
         out
     }
 
-    /// Rows of the text alternative: a place on the axis and each curve's value. Time is cut into even intervals; losses are
-    /// shown at every point of the first curve.
+    /// Rows of the text alternative: a place on the axis and each curve's value. Time is cut into
+    /// even intervals; losses are shown at every point of the first curve.
     pub fn table(&self) -> Vec<(f64, Vec<Option<f64>>)> {
         let (start, end) = self.shown;
         let places: Vec<f64> = match self.axis {

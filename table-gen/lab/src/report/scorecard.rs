@@ -108,7 +108,8 @@ pub const HEADER: [&str; 11] = [
     "ripple mHz",
 ];
 
-/// The scorecard at one inertia as texts, a row a loss: four nadirs, then what else the table is judged by.
+/// The scorecard at one inertia as texts, a row a loss: four nadirs, then what else the table is
+/// judged by.
 pub fn rows(found: &Scorecard, inertia: f64) -> Vec<[String; HEADER.len()]> {
     let of = |controller| found.of(controller, inertia);
     let [none, droop, table, limit] = Controller::ALL.map(of);

@@ -2,7 +2,8 @@
 //! the plant's):
 //!
 //! ```text
-//! e = max(-f - deadband, 0) / R_ev        T_ev q' = e - D q        u = clamp(q, 0, 1)        EV power P u
+//! e = max(-f - deadband, 0) / R_ev        T_ev q' = e - D q
+//! u = clamp(q, 0, 1)                      EV power P u
 //! ```
 //!
 //! Five states, with kinks at the dead band and at saturation, by the classical Runge-Kutta method.

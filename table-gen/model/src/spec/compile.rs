@@ -10,7 +10,7 @@
 //! | `G((f in A & !(f in B)) -> F f in B)`, also `F[<=t s]` | `requirements.inner_hz` | reach I2 |
 //! | `F f in B`, also `F[<=t s]` | the same | reach I2 |
 //! | `F G f in B`, `G(f in B -> G f in B)` | `requirements.stay` | reach, then safety |
-//! | `(loss <= c) -> φ`, `(loss >= c) -> φ` around it all | an end of `uncertainty.loss_gw` | the adversary |
+//! | `(loss <= c) -> φ`, or `>=`, around all | an end of `uncertainty.loss_gw` | adversary |
 //!
 //! `F G F φ` is read as `G F φ`, and `G F G φ` as `F G φ`, which say the same.
 //!

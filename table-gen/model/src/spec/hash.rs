@@ -7,12 +7,12 @@
 //!
 //! | kind | written as |
 //! |---|---|
-//! | number | the 16 lower-case hexadecimal digits of its IEEE 754 binary64 bits, most significant first; -0 as 0 |
+//! | number | 16 lower-case hexadecimal digits: its binary64 bits, highest first; -0 as 0 |
 //! | numbers | the same, joined by `,` |
 //! | whole number | decimal |
 //! | flag | `true` or `false` |
 //! | name, choice | the characters themselves (a name cannot contain a line break) |
-//! | formula | as it is printed, so that spaces and the choice of words do not matter; without one there is no such line |
+//! | formula | as it is printed, whatever its spaces and words; without one no such line |
 //! | absent | `none` |
 //!
 //! Nothing in it depends on the platform, on the order of keys in the file or on how a number was

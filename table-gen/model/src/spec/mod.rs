@@ -8,9 +8,9 @@
 //! | text becomes a table of keys | `load` | syntax, with line and column |
 //! | names and types are checked | `keys`, `resolve` | unknown key, wrong type |
 //! | `--set KEY=VALUE` replaces single keys | `overrides` | the same, named as an override |
-//! | a formula becomes the keys that say the same | `formula` | syntax, outside the fragment, a key that disagrees |
+//! | a formula becomes keys | `formula` | syntax, outside the fragment, a key that disagrees |
 //! | missing keys take their defaults | `plant`, `grid`, `sampling`, `claims` | |
-//! | ranges, then relations between keys | `validate`, `geometry`, `memory` | a value or a combination that cannot be |
+//! | ranges, relations of keys | `validate`, `geometry`, `memory` | values that cannot be |
 //!
 //! What comes out is a [`Spec`]: plain numbers in the units that the key names carry.
 //! [`Spec::hash`] names it in the table's header, so that a table can be told from one made for

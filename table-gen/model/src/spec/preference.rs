@@ -7,7 +7,8 @@ use serde::{Deserialize, Serialize};
 ///
 /// ```text
 /// r(t) = (f(t) - f(t - slope_window)) / slope_window
-/// m(t) = max(m(t - tick) - slope_release tick, clamp(slope_gain (-r - slope_threshold), 0, slope_most))
+/// m(t) = max(m(t - tick) - slope_release tick,
+///            clamp(slope_gain (-r - slope_threshold), 0, slope_most))
 /// u(t) = clamp((droop (setpoint - f) + m) / P, 0, 1)
 /// ```
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

@@ -305,7 +305,7 @@ impl<const D: usize> Mode<D> {
                 for i in 0..shape.count[j] {
                     let exact = scale * Interval::point(f64::from(i));
                     let entry = fixed(exact.mid(), d)?;
-                    // |real - entry| <= radius of the interval + distance of its middle from the entry.
+                    // |real - entry| <= the interval's radius + its middle's distance to the entry.
                     let distance = (exact.mid() - entry as f64 / ONE).abs();
                     error = error.max((exact.radius() + distance).next_up());
                     row[j].push(entry);

@@ -129,7 +129,8 @@ mod tests {
     #[test]
     fn an_exception_costs_the_entropy_of_saying_where_it_is() {
         assert_eq!(cost(8, 8), 0.0);
-        // One of four: lb 4 bits to pick it, 3 lb (4/3) for the others, and the two of the constant.
+        // One of four: lb 4 bits to pick it, 3 lb (4/3) for the others, and the two of the
+        // constant.
         assert!((cost(4, 3) - (2.0 + 3.0 * (4.0f64 / 3.0).log2() + EXCEPTION_BITS)).abs() < 1e-12);
         assert!(cost(8, 6) > cost(8, 7));
     }

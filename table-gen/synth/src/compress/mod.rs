@@ -85,8 +85,8 @@ pub struct CompressedLaw {
 pub struct LawReport {
     /// Cells that the game won, target not counted.
     pub winning_cells: usize,
-    /// Cells from which the table leads to the law's target. They are the cells of its domain; for a C2
-    /// that is asked in I1 alone, those of C1 too.
+    /// Cells from which the table leads to the law's target. They are the cells of its domain; for
+    /// a C2 that is asked in I1 alone, those of C1 too.
     pub domain_cells: usize,
     /// Leaves of the membership tree.
     pub domain_leaves: u32,

@@ -1,8 +1,8 @@
 //! `table.domain = "reachable"`: only what the closed loop asks for.
 //!
 //! A simple controller is fixed first. It takes the level of the best affine piece where the game,
-//! ranked by that piece, allows it, and the nearest allowed level elsewhere. Then its closed loop is
-//! explored.
+//! ranked by that piece, allows it, and the nearest allowed level elsewhere. Then its closed loop
+//! is explored.
 //!
 //! The explored cells must be covered. They keep the controller's level; where whole cells were
 //! explored, any allowed level will do whose box stays among them. So the loop stays within what

@@ -4,7 +4,7 @@
 //! | game | full | lean |
 //! |---|---|---|
 //! | reach | inputs (4 or 8 bytes) and rank (2 bytes) | rank (1 byte, 2 past 254 sweeps) |
-//! | safety | inputs (4 or 8 bytes) | witness: one input that keeps the cell in the kernel (1 byte) |
+//! | safety | inputs (4 or 8 bytes) | witness: an input that keeps the cell (1 byte) |
 //!
 //! The inputs of a cell of rank r are those whose box lies in the cells of lower rank, so they can
 //! be found again from the ranks; those of a cell of the kernel from the kernel.

@@ -5,7 +5,7 @@
 //! |---|---|---|
 //! | [`recurrence`] | `G F g_1 & ... & G F g_n` | (generalised) Büchi |
 //! | [`persistence`] | `F G b` | co-Büchi |
-//! | [`reactive`] | `(G F a_1 & ... & G F a_m) -> (G F g_1 & ... & G F g_n)` | generalised reactivity of rank 1 |
+//! | [`reactive`] | `(G F a_1 & ... & G F a_m) -> (G F g_1 & ... & G F g_n)` | GR(1) |
 //!
 //! All are one fixed point (Piterman, Pnueli and Sa'ar, VMCAI 2006), with `pre(S)` the cells that
 //! have an input whose whole box lies in S:

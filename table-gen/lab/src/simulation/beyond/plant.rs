@@ -1,7 +1,8 @@
 //! The equations of the plant with its limits, and how they are integrated.
 //!
 //! ```text
-//! f' = (p + P u - w(t) - n(t) - D f) / 2H(t)      g' = clamp((K z(f) - g) / T_G, ± rate), 0 at a limit of g
+//! f' = (p + P u - w(t) - n(t) - D f) / 2H(t)
+//! g' = clamp((K z(f) - g) / T_G, ± rate), 0 at a limit of g
 //! l' = (g + T_1 g' - l) / T_2                     p' = (l - p) / T_t
 //! ```
 //!
