@@ -28,6 +28,7 @@
 mod clock;
 mod config;
 mod fit;
+pub mod reference;
 mod report;
 mod start;
 
@@ -154,10 +155,11 @@ impl<'t, S: FrequencySource, D: Dispatch, W: Watchdog> Charger<'t, S, D, W> {
             let trusts = plant.filter(|_| !always_on);
             trusts.map_or(0, |plant| trust_ticks(&plant, tick_ms).max(delay_ticks))
         });
+        let filter = Filter::new(config.filter_ticks);
         let misfits = match (&table, &config.installation) {
             (Ok(view), Some(installation)) => {
                 let meter = MeterFacts::of(&source);
-                misfits(view.header(), installation, meter, config.filter_ticks)
+                misfits(view.header(), installation, meter, &filter)
             }
             _ => Misfits::NONE,
         };
@@ -174,7 +176,7 @@ impl<'t, S: FrequencySource, D: Dispatch, W: Watchdog> Charger<'t, S, D, W> {
             config,
             tick_ms,
             gate,
-            filter: Filter::new(config.filter_ticks),
+            filter,
             observer,
             control: ControlLoop::with_table(table).with_offset(config.level_offset),
             droop,

@@ -17,7 +17,7 @@
 use embedded_hal::spi::{ErrorType, MODE_3, Operation, SpiDevice};
 use embedded_hal_nb::serial::Write as _;
 use firmware::board::{Board, Hardware, Rest};
-use firmware::charger::Watchdog;
+use firmware::charger::{Watchdog, reference};
 use firmware::dispatch::car::{CarSense, CarState};
 use firmware::dispatch::pilot::PILOT_HZ;
 use firmware::fault::ResetCause;
@@ -36,14 +36,12 @@ use stm32f4xx_hal::watchdog::IndependentWatchdog;
 
 /// Crystal of the board \[MHz\].
 const CRYSTAL_MHZ: u32 = 25;
-/// Tolerance of the crystal \[ppm\].
-const CRYSTAL_PPM: u16 = 20;
 /// Core and timer clock \[MHz\].
 const CORE_MHZ: u32 = 84;
 /// Timer of the captures \[Hz\]: the whole timer clock, so that its tick is worth 6 µHz.
 const CAPTURE_HZ: u32 = CORE_MHZ * 1_000_000;
-/// What the comparator in front of PA0 must keep to, noise of the mains included \[ns\].
-const CROSSING_JITTER_NS: u32 = 500;
+// The products' tables are chosen for these captures.
+const _: () = assert!(CAPTURE_HZ == reference::TIMER_HZ);
 /// Turns for which the crystal is waited for.
 const CRYSTAL_TURNS: u32 = 400_000;
 /// Conversions of the pilot: 68 cycles of 21 MHz each, so 1.04 ms, more than a period.
@@ -293,8 +291,8 @@ pub(crate) struct Crossings {
 
 impl Captures for Crossings {
     const TIMER_HZ: u32 = CAPTURE_HZ;
-    const CLOCK_PPM: u16 = CRYSTAL_PPM;
-    const JITTER_NS: u32 = CROSSING_JITTER_NS;
+    const CLOCK_PPM: u16 = reference::CLOCK_PPM;
+    const JITTER_NS: u32 = reference::JITTER_NS;
 
     fn lost(&mut self) -> bool {
         // SAFETY: reads a status register, and clears one flag by writing 0 to it and 1, which

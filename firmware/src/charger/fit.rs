@@ -6,6 +6,7 @@
 //! droop.
 
 use crate::frequency::FrequencySource;
+use crate::frequency::filter::Filter;
 use crate::table::{Direction, Header, Hypotheses, TICK_MS_MAX};
 use crate::units::MICRO;
 
@@ -96,6 +97,14 @@ impl Misfits {
         self.0 & other.0 == other.0
     }
 
+    /// The names of those in the set.
+    pub fn names(self) -> impl Iterator<Item = &'static str> {
+        Self::NAMES
+            .into_iter()
+            .filter(move |(misfit, _)| self.contains(*misfit))
+            .map(|(_, name)| name)
+    }
+
     const fn insert_if(&mut self, outside: bool, misfit: Self) {
         if outside {
             self.0 |= misfit.0;
@@ -103,23 +112,19 @@ impl Misfits {
     }
 }
 
-/// Lag of a moving average over so many ticks, for a ramp \[ms\].
-const fn filter_lag_ms(filter_ticks: u8, tick_ms: u16) -> u32 {
-    (filter_ticks as u32).saturating_sub(1) * tick_ms as u32 / 2
-}
-
 /// Compares a charger with the header of its table.
 pub fn misfits(
     header: &Header,
     installation: &Installation,
     meter: MeterFacts,
-    filter_ticks: u8,
+    filter: &Filter,
 ) -> Misfits {
     let assumed: &Hypotheses = &header.hypotheses;
     let mut found = Misfits::NONE;
     let [error_uhz, ..] = assumed.estimate_error;
     found.insert_if(meter.error_uhz > error_uhz, Misfits::METER_ERROR);
-    let lag_ms = u32::from(meter.lag_ms) + filter_lag_ms(filter_ticks, header.tick_ms);
+    let lag_ms =
+        u32::from(meter.lag_ms) + filter.lag_half_ticks() as u32 * u32::from(header.tick_ms) / 2;
     let [least, most] = assumed.meter_lag_ms.map(u32::from);
     found.insert_if(lag_ms < least || lag_ms > most, Misfits::METER_LAG);
     let longest = assumed.tick_most_ms.min(installation.tick_most_ms);

@@ -1,5 +1,5 @@
 //! The contactor between mains and car: opened after a pause has lasted, and not closed again too
-//! soon.
+//! soon. The frequency response does not operate it.
 //!
 //! A relay wears with every operation, above all with those under load. So a pause is first
 //! signalled on the pilot, and the contactor opens only when the pause has lasted for
@@ -91,6 +91,20 @@ impl<O: OutputPin> Contactor<O> {
             Some(open @ (Contact::Open { .. } | Contact::Idle)) => open,
         };
         self.set(next)
+    }
+
+    /// Leaves the contactor as it is, for the pause is the frequency response's and will end: what
+    /// is closed stays closed however long it takes. A position that is unknown becomes open.
+    ///
+    /// # Errors
+    /// As [`Contactor::request`].
+    pub fn hold(&mut self) -> Result<(), O::Error> {
+        let next = match self.contact {
+            Some(Contact::Closed | Contact::Pausing { .. }) => Contact::Closed,
+            Some(open) => open,
+            None => Contact::Idle,
+        };
+        self.set(next).map(|_closed| ())
     }
 
     /// Opens at once, for the car does not ask for power. What was open stays as it is.

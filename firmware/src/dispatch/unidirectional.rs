@@ -5,7 +5,8 @@
 //! the fleet's mean is what was wanted.
 //!
 //! The contactor closes when a current is offered and the car asks for power, and not otherwise. It
-//! opens at once when the car no longer asks, and when its state is a fault.
+//! opens at once when the car no longer asks, and when its state is a fault; after a while when
+//! limits leave less than 6 A; and never because the response pauses the car.
 
 use embedded_hal::digital::OutputPin;
 use embedded_hal::pwm::SetDutyCycle;
@@ -107,6 +108,13 @@ impl<P: SetDutyCycle, O: OutputPin, C: CarSense> Dispatch for Unidirectional<P, 
         let may_ask = matches!(state, Some(CarState::B | CarState::C));
         if !may_ask {
             return self.rest(now_ms);
+        }
+        if wanted == 0 && self.limits_ma.lowest() >= CURRENT_MIN_MA {
+            // The response pauses the car, and will let it go on.
+            self.pilot.offer(0).map_err(|_| DispatchError::Pilot)?;
+            let held = self.contactor.hold();
+            held.map_err(|_| DispatchError::Contactor)?;
+            return Ok(SetPoint::Paused);
         }
         if wanted == 0 || !self.contactor.may_close(now_ms) {
             return self.pause(wanted > 0, now_ms);

@@ -55,8 +55,10 @@ pub const I2C_ADDRESS: u8 = 0x38;
 pub const PERIOD_CLOCK_HZ: u32 = 223_750;
 /// Counts in a nominal period, `PERIOD + 1`.
 const NOMINAL_COUNTS: u32 = PERIOD_CLOCK_HZ / NOMINAL_HZ;
-/// Bound on a reading's error \[µHz\]: one count of 4475 at 50 Hz, rounded up.
-pub const ERROR_UHZ: u32 = NOMINAL_HZ * MICRO as u32 / NOMINAL_COUNTS + 1;
+/// Error of the chip's crystal, temperature and ageing included \[ppm\].
+pub const CLOCK_PPM: u32 = 30;
+/// Bound on a reading's error \[µHz\]: one count of 4475 at 50 Hz, rounded up, and the crystal.
+pub const ERROR_UHZ: u32 = NOMINAL_HZ * MICRO as u32 / NOMINAL_COUNTS + 1 + NOMINAL_HZ * CLOCK_PPM;
 /// Readings in a row that may be equal \[ticks\]. On 9 August 2019 PERIOD would have stood still
 /// for 18 s at most.
 const STUCK_TICKS: u16 = 600;

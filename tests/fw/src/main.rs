@@ -20,7 +20,7 @@ use fw::pil::run::{Outcome, Pair, closed_loop, recorded};
 use fw::pil::scenario::{self, Scenario};
 use fw::pil::{qemu, record};
 use fw::root;
-use fw::table_fit::{self, Candidate, Product};
+use fw::table_fit::{self, Built, Candidate};
 
 /// The table of processor-in-the-loop runs and measurements: a table by games.
 const TABLE: &str = "firmware/tables/paper-bi.bin";
@@ -165,8 +165,8 @@ fn plan(choice: &Choice) -> Result<Vec<(Image, Option<PathBuf>)>, AnyError> {
     let mut chosen = Vec::new();
     let mut refused = Vec::new();
     let mut known = false;
-    for product in Product::all()? {
-        let name = product.image.name;
+    for built in Built::all() {
+        let name = built.image.name;
         if choice.product.as_ref().is_some_and(|wanted| wanted != name) {
             continue;
         }
@@ -175,13 +175,13 @@ fn plan(choice: &Choice) -> Result<Vec<(Image, Option<PathBuf>)>, AnyError> {
         let table = match &candidate {
             Some(candidate) => candidate,
             None => {
-                let path = product.default_table();
+                let path = built.default_table();
                 if !path.exists() {
                     println!(
                         "{name}: NO TABLE, for {} is missing: the charger runs on the droop",
                         path.display()
                     );
-                    chosen.push((product.image, None));
+                    chosen.push((built.image, None));
                     continue;
                 }
                 shipped = Candidate::read(&path)?;
@@ -189,7 +189,7 @@ fn plan(choice: &Choice) -> Result<Vec<(Image, Option<PathBuf>)>, AnyError> {
                 &shipped
             }
         };
-        let misfits = table.misfits(&product)?;
+        let misfits = table.misfits(&built)?;
         if misfits.is_empty() {
             println!("{name}: the table fits");
         } else if candidate.is_none() {
@@ -208,7 +208,7 @@ fn plan(choice: &Choice) -> Result<Vec<(Image, Option<PathBuf>)>, AnyError> {
             refused.push(reason);
             continue;
         }
-        chosen.push((product.image, named.clone()));
+        chosen.push((built.image, named.clone()));
     }
     if !known {
         let names = PRODUCTS.map(|image| image.name).join(", ");

@@ -7,10 +7,11 @@
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
-use firmware::charger::{ChargerConfig, Installation, MeterFacts, Misfits, misfits};
-use firmware::frequency::ade7953;
-use firmware::frequency::zero_crossing::{CYCLES_DEFAULT, ZeroCrossing, ZeroCrossingError};
+use firmware::charger::reference::{Product, products};
+use firmware::charger::{ChargerConfig, Misfits, misfits};
+use firmware::frequency::filter::Filter;
 use firmware::table::{TableError, TableView};
+use model::hex::hex;
 use model::spec::Spec;
 use model::verdict::Verdict;
 use sha2::{Digest, Sha256};
@@ -18,56 +19,42 @@ use sha2::{Digest, Sha256};
 use crate::images::{Image, PRODUCTS};
 use crate::root;
 
-/// Timer, crystal and comparator of the reference board, as its image has them.
-const TIMER_HZ: u32 = 84_000_000;
-const CRYSTAL_PPM: u16 = 20;
-const JITTER_NS: u32 = 500;
-
-/// A product: an image and what the charger is that runs it.
+/// A product and its image.
 #[derive(Debug, Clone, Copy)]
-pub struct Product {
+pub struct Built {
     /// The image.
     pub image: Image,
-    /// What the charger is.
-    pub installation: Installation,
-    /// What its meter says of itself.
-    pub meter: MeterFacts,
+    /// What the charger is that runs it.
+    pub product: Product,
 }
 
-impl Product {
-    /// Every build of the product.
-    ///
-    /// # Errors
-    /// The reference board's captures are not a meter.
-    pub fn all() -> Result<[Self; 4], FitError> {
-        let captures = ZeroCrossing::new(TIMER_HZ, CYCLES_DEFAULT, CRYSTAL_PPM)
-            .map_err(FitError::Captures)?
-            .with_jitter_ns(JITTER_NS);
-        Ok(PRODUCTS.map(|image| Self {
-            image,
-            installation: if image.has("bidirectional") {
-                Installation::REFERENCE_BIDIRECTIONAL
-            } else {
-                Installation::REFERENCE_UNIDIRECTIONAL
-            },
-            meter: if image.has("ade7953") {
-                MeterFacts {
-                    error_uhz: ade7953::ERROR_UHZ,
-                    lag_ms: ade7953::LAG_MS,
-                }
-            } else {
-                MeterFacts::of(&captures)
-            },
-        }))
+impl Built {
+    /// Every build of the product. An image without a product, or the other way round, is a defect
+    /// that the tests find.
+    pub fn all() -> Vec<Self> {
+        let products = products();
+        let of = |image: Image| {
+            let product = products
+                .into_iter()
+                .find(|product| product.name == image.name);
+            product.map(|product| Self { image, product })
+        };
+        PRODUCTS.into_iter().filter_map(of).collect()
     }
 
-    /// The shipped table for its direction and power.
+    /// The shipped table for its direction, power and meter.
     pub fn default_table(&self) -> PathBuf {
-        let name = if self.image.has("bidirectional") {
-            "gb-bi"
+        let direction = if self.image.has("bidirectional") {
+            "bi"
         } else {
-            "gb-uni"
+            "uni"
         };
+        let chip = if self.image.has("ade7953") {
+            "-ade7953"
+        } else {
+            ""
+        };
+        let name = format!("gb-{direction}{chip}");
         root().join(format!("firmware/tables/{name}.bin"))
     }
 }
@@ -75,9 +62,6 @@ impl Product {
 /// Why a table cannot go into an image.
 #[derive(Debug, thiserror::Error)]
 pub enum FitError {
-    /// The reference board's captures are no meter: a defect of this file.
-    #[error("the reference board's captures are no meter: {0:?}")]
-    Captures(ZeroCrossingError),
     /// It cannot be read.
     #[error("{path}: {source}", path = shown(path))]
     Read {
@@ -151,14 +135,14 @@ impl Candidate {
     ///
     /// # Errors
     /// As [`Candidate::read`].
-    pub fn misfits(&self, product: &Product) -> Result<Misfits, FitError> {
+    pub fn misfits(&self, built: &Built) -> Result<Misfits, FitError> {
         let table = TableView::parse(&self.bytes).map_err(|error| FitError::Rejected {
             path: self.path.clone(),
             error,
         })?;
-        let filter_ticks = ChargerConfig::DEFAULT.filter_ticks;
-        let (installation, meter) = (&product.installation, product.meter);
-        Ok(misfits(table.header(), installation, meter, filter_ticks))
+        let filter = Filter::new(ChargerConfig::DEFAULT.filter_ticks);
+        let (installation, meter) = (&built.product.installation, built.product.meter);
+        Ok(misfits(table.header(), installation, meter, &filter))
     }
 
     /// The table, the spec that it was made from, and what is proven of it, for people.
@@ -171,11 +155,7 @@ impl Candidate {
         let made_from = Spec::shipped_names()
             .iter()
             .find(|name| Spec::load(name, &[]).is_ok_and(|spec| spec.hash() == header.spec_hash));
-        let hash: String = header
-            .spec_hash
-            .iter()
-            .map(|byte| format!("{byte:02x}"))
-            .collect();
+        let hash = hex(&header.spec_hash);
         // Writing to a String cannot fail.
         let _ = match made_from {
             Some(name) => write!(text, "; spec {name} ({hash})"),
@@ -197,10 +177,7 @@ impl Candidate {
 
     /// What the verdict beside the table says, if it is about these bytes.
     fn proven(&self) -> String {
-        let sha: String = Sha256::digest(&self.bytes)
-            .iter()
-            .map(|byte| format!("{byte:02x}"))
-            .collect();
+        let sha = hex(&Sha256::digest(&self.bytes));
         let beside = [
             self.path.with_extension("verdict.json"),
             self.path.with_file_name("verdict.json"),
@@ -237,10 +214,16 @@ impl Candidate {
 
 /// The names of misfits.
 pub fn names(misfits: Misfits) -> String {
-    Misfits::NAMES
-        .iter()
-        .filter(|(misfit, _)| misfits.contains(*misfit))
-        .map(|(_, name)| *name)
-        .collect::<Vec<_>>()
-        .join(", ")
+    misfits.names().collect::<Vec<_>>().join(", ")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_image_has_its_product() {
+        assert_eq!(Built::all().len(), PRODUCTS.len());
+        assert_eq!(products().len(), PRODUCTS.len());
+    }
 }
