@@ -45,16 +45,21 @@ impl<const D: usize> Flow<D> {
         }
     }
 
-    /// The flow of `x' = A x + b v` over a time \[s\].
+    /// The flow of `x' = A x + b v` over a time \[s\]; what a decimal time such as 0.1 s is off by
+    /// as a binary number is enclosed.
     pub fn over(a: &Matrix<D>, b: &Vector<D>, time_s: f64) -> Self {
-        let norm = norm(a, b) * time_s;
+        let norm = (norm(a, b) * time_s.next_up()).next_up();
         let halvings = if norm <= NORM_MAX {
             0
         } else {
             (norm / NORM_MAX).log2().ceil() as i32
         };
         // A power of two: the division is exact.
-        let step = Interval::point(time_s * 2f64.powi(-halvings));
+        let scale = 2f64.powi(-halvings);
+        let step = Interval {
+            low: time_s.next_down().max(0.0) * scale,
+            high: time_s.next_up() * scale,
+        };
         let mut flow = Self::series(a, b, step);
         for _ in 0..halvings {
             flow = flow.then(&flow);
@@ -126,7 +131,7 @@ impl<const D: usize> Flow<D> {
 /// share is the difference of Γ, exactly; elsewhere it is the piece's length times the largest
 /// magnitude.
 pub fn absolute_integral<const D: usize>(a: &Matrix<D>, b: &Vector<D>, time_s: f64) -> [f64; D] {
-    let length = time_s / f64::from(PIECES);
+    let length = (time_s / f64::from(PIECES)).next_up();
     let step = Flow::over(a, b, length);
     let tube = tube(a, length);
     let mut y = *b;
@@ -184,7 +189,7 @@ pub fn largest<const D: usize>(a: &Matrix<D>, time_s: f64) -> [[f64; D]; D] {
 /// 1/2.
 pub fn tube<const D: usize>(a: &Matrix<D>, length_s: f64) -> Matrix<D> {
     let zero = [Interval::ZERO; D];
-    let span = norm(a, &zero) * length_s;
+    let span = (norm(a, &zero) * length_s.next_up()).next_up();
     // exp(x) - 1 - x <= x² for 0 <= x <= 1; past that the bound exp(x) is used, which is crude but
     // valid.
     let rest = if span <= 1.0 {
@@ -194,7 +199,7 @@ pub fn tube<const D: usize>(a: &Matrix<D>, length_s: f64) -> Matrix<D> {
     };
     let time = Interval {
         low: 0.0,
-        high: length_s,
+        high: length_s.next_up(),
     };
     let mut out = Flow::<D>::identity().phi;
     for i in 0..D {

@@ -54,6 +54,16 @@ fn ms(key: &'static str, value_ms: f64) -> Result<u16, FieldError> {
     })
 }
 
+/// A range of times in ms, outward.
+fn ms_range(key: &'static str, [least, most]: [f64; 2]) -> Result<[u16; 2], FieldError> {
+    // Sums of decimal times are off by their last bits.
+    const NOISE_MS: f64 = 1e-6;
+    Ok([
+        ms(key, (least + NOISE_MS).floor())?,
+        ms(key, (most - NOISE_MS).ceil())?,
+    ])
+}
+
 /// Parts per million of 1, micro-units of a unit.
 const MICRO: f64 = 1e6;
 
@@ -105,7 +115,7 @@ pub fn hypotheses(spec: &Spec) -> Result<Hypotheses, FieldError> {
         *stored = whole("uncertainty.measurement", error, MICRO)?;
     }
     let [lag_least, lag_most] = spec.meter.lag_ms();
-    let [delay_least, delay_most] = *uncertainty.actuation_delay_s.ends_s();
+    let [delay_least, delay_most] = spec.command_delay_s();
     let [loss_low, loss_high] = uncertainty.loss_gw;
     let inertia = spec.inertia_band();
     let gain = spec.governor_gain_band();
@@ -115,8 +125,8 @@ pub fn hypotheses(spec: &Spec) -> Result<Hypotheses, FieldError> {
     let loss = "uncertainty.loss_gw";
     Ok(Hypotheses {
         estimate_error,
-        meter_lag_ms: [ms(lag, lag_least)?, ms(lag, lag_most)?],
-        actuation_delay_ms: [ms(delay, 1e3 * delay_least)?, ms(delay, 1e3 * delay_most)?],
+        meter_lag_ms: ms_range(lag, [lag_least, lag_most])?,
+        actuation_delay_ms: ms_range(delay, [1e3 * delay_least, 1e3 * delay_most])?,
         participation_relative_ppm: whole(
             "uncertainty.participation",
             uncertainty.participation,

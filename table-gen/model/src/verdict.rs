@@ -92,6 +92,12 @@ pub enum ClaimName {
     Table,
     /// The meter errs by no more than is assumed.
     Observer,
+    /// Pilot, contactor and cars err by no more than is assumed.
+    Dispatch,
+    /// A product of this repository is what the table assumes.
+    Image,
+    /// The droop alone keeps f above 49.2 Hz.
+    Fallback,
 }
 
 impl ClaimName {
@@ -107,6 +113,9 @@ impl ClaimName {
             Self::Stay => "stay",
             Self::Table => "table",
             Self::Observer => "observer",
+            Self::Dispatch => "dispatch",
+            Self::Image => "image",
+            Self::Fallback => "fallback",
         }
     }
 }

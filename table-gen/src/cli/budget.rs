@@ -5,7 +5,8 @@ use std::path::{Path, PathBuf};
 
 use firmware::table::TableView;
 
-use super::{Failure, OutputArgs, Overrides, output, progress};
+use super::{Failure, OutputArgs, Overrides, output, progress, size_front};
+use lab::report::chart;
 use model::budget::Budget;
 use model::spec::Spec;
 use synth::budget::{self, sweep};
@@ -154,7 +155,8 @@ fn run_sweep(args: &BudgetArgs, spec: &Spec, options: &Options) -> Result<(), Fa
     }
     sweep::mark_pareto(&mut outcomes);
     if let Some(path) = &args.svg {
-        let picture = sweep::svg(&outcomes).map_err(Failure::BadInput)?;
+        let picture = chart::svg(&size_front::figure(&outcomes)).map_err(Failure::bad)?;
+        let picture = chart::with_style(&picture);
         std::fs::write(path, picture)
             .map_err(|error| Failure::BadInput(format!("{}: {error}", path.display())))?;
     }

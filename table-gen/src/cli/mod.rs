@@ -31,6 +31,7 @@ mod replay;
 mod report;
 mod run_tables;
 mod simulate;
+mod size_front;
 mod synth;
 mod synth_report;
 mod time_left;

@@ -1,8 +1,8 @@
 //! From what an exploration found to the claims of the spec.
 
 use super::closed_loop::Model;
-use super::header;
 use super::outcome::{Outcome, Violation};
+use super::{dispatch, header, image};
 use firmware::table::{Law, TableView};
 use model::spec::Spec;
 use model::verdict::{Claim, ClaimName};
@@ -34,8 +34,9 @@ pub(super) fn header(table: &TableView<'_>, spec: &Spec) -> Claim {
 impl Findings<'_> {
     /// All claims, in the order in which a reader asks.
     pub(super) fn claims(&self) -> Vec<Claim> {
-        let mut claims = vec![
-            header(self.table, self.spec),
+        let mut claims = vec![header(self.table, self.spec), dispatch::claim(self.spec)];
+        claims.extend(image::claim(self.table, self.spec));
+        claims.extend([
             self.containment(),
             self.reach(
                 ClaimName::ReachOuter,
@@ -48,7 +49,7 @@ impl Findings<'_> {
                 "in I1 and outside I2, f is in I2",
             ),
             self.settle(),
-        ];
+        ]);
         if self.table.law(Law::C2).is_some() {
             claims.push(self.hand_over());
         }
@@ -123,8 +124,13 @@ impl Findings<'_> {
     fn settle(&self) -> Claim {
         let limit = self.spec.requirements.settle_within_s;
         let bound = f64::from(self.tally.settle_ticks) * self.model.tick_s;
+        // With Hold, f that leaves I2 again has not settled.
+        let mut kinds = vec![Violation::Late, Violation::Uncovered];
+        if self.spec.requirements.stay {
+            kinds.push(Violation::Left);
+        }
         let reason = self
-            .reason(&[Violation::Late, Violation::Uncovered])
+            .reason(&kinds)
             .or_else(|| (bound > limit).then(|| format!("it may take {bound:.1} s")));
         let target = if self.spec.requirements.stay {
             "I2 for good"

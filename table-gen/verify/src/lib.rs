@@ -36,6 +36,7 @@ mod claims;
 mod closed_cells;
 mod closed_loop;
 mod delayed_loop;
+mod dispatch;
 mod drive;
 mod error;
 mod estimate_error;
@@ -44,6 +45,7 @@ mod header;
 mod longest_path;
 
 mod held_input;
+mod image;
 mod no_control;
 mod outcome;
 mod path;
@@ -188,6 +190,8 @@ fn of_response(
 ) -> Result<Verdict, VerifyError> {
     let header = table.header();
     let mut claims = vec![claims::header(table, spec)];
+    claims.push(dispatch::claim(spec));
+    claims.extend(image::claim(table, spec));
     let proof = response::verify(table, spec, go_on)?;
     claims.extend(proof.claims);
     Ok(Verdict {

@@ -124,8 +124,10 @@ fn cut(edges: &[i32], axis: usize, error: f64, parts: Vec<Part>) -> Vec<Part> {
     let mut out = Vec::with_capacity(parts.len());
     for part in parts {
         let bounds = part.set.bounds(axis);
-        let first = edges.partition_point(|edge| f64::from(*edge) <= bounds.low - error);
-        let last = edges.partition_point(|edge| f64::from(*edge) <= bounds.high + error);
+        let first =
+            edges.partition_point(|edge| f64::from(*edge) <= (bounds.low - error).next_down());
+        let last =
+            edges.partition_point(|edge| f64::from(*edge) <= (bounds.high + error).next_up());
         // Region i lies between the edges i-1 and i.
         for region in first..=last {
             let low = match region.checked_sub(1) {

@@ -207,7 +207,7 @@ impl<'a> Fleets<'a> {
     pub(super) fn new(table: &'a TableView<'a>, spec: &'a Spec) -> Self {
         let tick_s = f64::from(table.header().tick_ms) / 1000.0;
         let parts = |s: f64| s * PARTS as f64 / tick_s;
-        let [least, most] = *spec.uncertainty.actuation_delay_s.ends_s();
+        let [least, most] = spec.command_delay_s();
         let [lag_ms, _] = spec.meter.lag_ms();
         // Inwards: a trajectory must be one that the spec allows.
         let (least, most) = (parts(least) - 1e-9, parts(most) + 1e-9);

@@ -177,7 +177,7 @@ fn hull_config(spec: &Spec, table: &TableView<'_>) -> Option<HullConfig> {
         tick_ms: table.header().tick_ms,
         meter_uhz: (uncertainty.measurement[0] * f64::from(MICRO)).round() as i32,
         meter_lag_s: spec.meter.lag_ms().map(|ms| ms / 1000.0),
-        delay_s: *uncertainty.actuation_delay_s.ends_s(),
+        delay_s: spec.command_delay_s(),
         participation: uncertainty.participation,
         participation_absolute: uncertainty.participation_absolute,
     })

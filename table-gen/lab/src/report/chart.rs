@@ -57,7 +57,6 @@ fn draw(figure: &Figure, root: &Root<'_>) -> Result<(), String> {
     draw_legend(figure, &legend).map_err(|error| error.to_string())?;
     let (start, end) = figure.shown;
     let (low, high) = figure.values;
-    let digits = figure.axis.digits();
     let label = |colour: Colour| ("sans-serif", LABEL_PX).into_font().color(&colour.rgb());
     let fail = |error: DrawingAreaErrorKind<std::io::Error>| error.to_string();
     let mut chart = ChartBuilder::on(&plot)
@@ -85,7 +84,7 @@ fn draw(figure: &Figure, root: &Root<'_>) -> Result<(), String> {
         .y_desc(figure.value_label)
         .axis_desc_style(label(Colour::Ink))
         .x_labels(13)
-        .x_label_formatter(&|place| format!("{place:.digits$}"))
+        .x_label_formatter(&|place| figure.axis.text(*place))
         .y_labels(9)
         .draw()
         .map_err(fail)?;
@@ -129,6 +128,18 @@ fn draw(figure: &Figure, root: &Root<'_>) -> Result<(), String> {
         chart
             .draw_series(LineSeries::new(points, style))
             .map_err(fail)?;
+    }
+    for mark in &figure.marks {
+        let colour = mark.colour.rgb();
+        let style = ShapeStyle {
+            color: colour.to_rgba(),
+            filled: mark.filled,
+            stroke_width: 1,
+        };
+        let name = Text::new(mark.name.clone(), (8, -14), label(Colour::Muted));
+        let drawn =
+            EmptyElement::at((mark.place, mark.value)) + Circle::new((0, 0), 5, style) + name;
+        chart.draw_series([drawn]).map_err(fail)?;
     }
     Ok(())
 }

@@ -101,6 +101,7 @@ fn figure(
         ),
         value_label: "Frequency [Hz]",
         digits: 4,
+        marks: Vec::new(),
         axis: Axis::Time,
         shown: (start, end),
         values: (lowest, highest + 0.05),

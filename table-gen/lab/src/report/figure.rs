@@ -14,6 +14,8 @@ pub enum Axis {
     Time,
     /// Lost infeed \[GW\].
     Loss,
+    /// Logarithm to base 10 of a table's bytes, told in bytes.
+    TableBytes,
 }
 
 impl Axis {
@@ -22,6 +24,7 @@ impl Axis {
         match self {
             Self::Time => "Time since the start [s]",
             Self::Loss => "Lost infeed [GW]",
+            Self::TableBytes => "Table [bytes]",
         }
     }
 
@@ -30,6 +33,7 @@ impl Axis {
         match self {
             Self::Time => "Time [s]",
             Self::Loss => "Loss [GW]",
+            Self::TableBytes => "Bytes",
         }
     }
 
@@ -38,14 +42,16 @@ impl Axis {
         match self {
             Self::Time => "time_s",
             Self::Loss => "loss_gw",
+            Self::TableBytes => "log10_bytes",
         }
     }
 
-    /// Digits of a label below the chart.
-    pub const fn digits(self) -> usize {
+    /// A place as it is told.
+    pub fn text(self, place: f64) -> String {
         match self {
-            Self::Time => 0,
-            Self::Loss => 1,
+            Self::Time => format!("{place:.0}"),
+            Self::Loss => format!("{place:.1}"),
+            Self::TableBytes => format!("{:.0}", 10f64.powf(place)),
         }
     }
 }
@@ -111,6 +117,21 @@ pub struct RangeOverTime {
     pub spans: Vec<(f64, f64, f64)>,
 }
 
+/// A point with its name.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Mark {
+    /// Its name.
+    pub name: String,
+    /// How it is drawn.
+    pub colour: Colour,
+    /// Place on the axis.
+    pub place: f64,
+    /// Value.
+    pub value: f64,
+    /// Whether it is filled.
+    pub filled: bool,
+}
+
 /// A chart over its axis.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Figure {
@@ -138,6 +159,8 @@ pub struct Figure {
     pub bands: Vec<ValueBand>,
     /// Sets: a bar at each time, joined by a pale area.
     pub ranges: Vec<RangeOverTime>,
+    /// Points.
+    pub marks: Vec<Mark>,
 }
 
 impl Figure {
@@ -157,6 +180,13 @@ impl Figure {
                     let _ = writeln!(out, "set,{},{time:.3},{value:.6}", range.name);
                 }
             }
+        }
+        for mark in &self.marks {
+            let _ = writeln!(
+                out,
+                "mark,{},{:.3},{:.6}",
+                mark.name, mark.place, mark.value
+            );
         }
         for stretch in &self.stretches {
             for end in [stretch.start_s, stretch.end_s] {
@@ -179,7 +209,7 @@ impl Figure {
             Axis::Time => (0..=TABLE_INTERVALS)
                 .map(|row| start + (end - start) * f64::from(row) / f64::from(TABLE_INTERVALS))
                 .collect(),
-            Axis::Loss => {
+            Axis::Loss | Axis::TableBytes => {
                 let first = self.curves.first();
                 first.map_or(Vec::new(), |c| c.points.iter().map(|(x, _)| *x).collect())
             }

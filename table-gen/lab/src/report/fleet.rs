@@ -67,6 +67,7 @@ pub fn fleet(spec: &str, config: &FleetConfig, run: &FleetRun) -> Section {
         description: "Participation that one firmware told the true state asks for, the mean of what the chargers ask for, and what the fleet gives.".to_owned(),
         value_label: "Participation [%]",
         digits: 1,
+        marks: Vec::new(),
         axis: Axis::Time,
         shown: (0.0, run.samples.last().map_or(1.0, |s| s.time_s)),
         values: (0.0, 105.0),

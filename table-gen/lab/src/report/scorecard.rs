@@ -75,6 +75,7 @@ fn figure(spec: &str, measure: Measure, inertia: f64, found: &Scorecard) -> Figu
             Measure::Final => "Final frequency [Hz]",
         },
         digits: 4,
+        marks: Vec::new(),
         axis: Axis::Loss,
         shown: (first, last),
         values: (low - MARGIN_HZ, high + MARGIN_HZ),

@@ -2,9 +2,12 @@
 
 use serde::{Deserialize, Serialize};
 
-/// Cars and contactors of the laboratory's fleet. No proof and no game reads this section: what it
-/// may do to the fleet's power must lie inside `uncertainty.actuation_delay_s` and the errors of
-/// participation. So it is no part of the spec's hash.
+/// Cars and contactors: what stands between a charger's command and the grid.
+///
+/// Dead time, ramp and the pilot's wait add to `uncertainty.actuation_delay_s` in what a table says
+/// of itself and in the proof ([`crate::spec::Spec::command_delay_s`]); the claim `dispatch` of a
+/// verdict holds the rest against the errors of participation. The fleet of the laboratory has such
+/// cars.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct ChargerSpec {

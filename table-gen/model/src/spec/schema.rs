@@ -3,8 +3,8 @@
 use serde::{Deserialize, Serialize};
 
 use super::{
-    BaselineSpec, ChargerSpec, FleetSpec, GridSpec, InputSpec, MeterSpec, MethodSpec, PlantSpec,
-    PreferenceSpec, RequirementsSpec, SamplingSpec, TableSpec, UncertaintySpec,
+    BaselineSpec, ChargerSpec, Direction, FleetSpec, GridSpec, InputSpec, MeterSpec, MethodSpec,
+    PlantSpec, PreferenceSpec, RequirementsSpec, SamplingSpec, TableSpec, UncertaintySpec,
 };
 
 /// A complete specification; one field per section of the TOML document.
@@ -103,6 +103,29 @@ impl Spec {
         let nominal = self.plant.damping_gw_per_hz;
         self.uncertainty.damping_gw_per_hz.unwrap_or([nominal; 2])
     }
+
+    /// Least and most time from a command to what the grid sees of it \[s\].
+    ///
+    /// With W the most, a charger's power at t lies among what it was told in \[t - W, t - least\]:
+    ///
+    /// - A pilot that may not change yet holds what was told at its last change, which was less
+    ///   than `pilot_change_s` ago if something else has been told since.
+    /// - A power y that moves to what it is told at a rate of a full swing in `ramp_s` cannot lie
+    ///   above all that was told in the last `ramp_s`: it would have fallen all the time, by a full
+    ///   swing. Nor below.
+    #[must_use]
+    pub fn command_delay_s(&self) -> [f64; 2] {
+        let [least, most] = *self.uncertainty.actuation_delay_s.ends_s();
+        let [dead_least, dead_most] = self.charger.dead_time_s;
+        let pilot = match self.fleet.direction {
+            Direction::Unidirectional => self.charger.pilot_change_s,
+            Direction::Bidirectional => 0.0,
+        };
+        [
+            least + dead_least,
+            most + dead_most + self.charger.ramp_s[1] + pilot,
+        ]
+    }
 }
 
 #[cfg(test)]
@@ -121,5 +144,23 @@ mod tests {
     #[test]
     fn the_defaults_are_valid() {
         Spec::default().validate("default").unwrap();
+    }
+
+    #[test]
+    fn cars_and_pilots_add_to_the_delay() {
+        let load = |set: &[&str]| {
+            let set: Vec<String> = set.iter().map(|s| (*s).to_owned()).collect();
+            Spec::load("gb-uni", &set).map(|spec| spec.command_delay_s())
+        };
+        assert_eq!(load(&[]).ok(), Some([0.1, 0.5]));
+        let car = [
+            "uncertainty.actuation_delay_s=[0.5,0.5]",
+            "charger.dead_time_s=[0.25,1]",
+            "charger.ramp_s=[0,2]",
+            "charger.pilot_change_s=5",
+        ];
+        assert_eq!(load(&car).ok(), Some([0.75, 8.5]));
+        let both = [&car[..], &["fleet.direction=bidirectional"]].concat();
+        assert_eq!(load(&both).ok(), Some([0.75, 3.5]));
     }
 }

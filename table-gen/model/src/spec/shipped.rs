@@ -7,6 +7,18 @@ pub(super) const SHIPPED: &[(&str, &str)] = &[
     ("gb-bi", include_str!("../../../specs/gb-bi.toml")),
     ("gb-uni", include_str!("../../../specs/gb-uni.toml")),
     (
+        "gb-bi-ade7953",
+        include_str!("../../../specs/gb-bi-ade7953.toml"),
+    ),
+    (
+        "gb-uni-ade7953",
+        include_str!("../../../specs/gb-uni-ade7953.toml"),
+    ),
+    (
+        "gb-uni-cars",
+        include_str!("../../../specs/gb-uni-cars.toml"),
+    ),
+    (
         "gb-low-inertia",
         include_str!("../../../specs/gb-low-inertia.toml"),
     ),

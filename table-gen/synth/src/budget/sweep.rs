@@ -1,7 +1,6 @@
 //! Guarantee against bytes: variants of a spec, each synthesised and compressed, and which of them
 //! nothing beats.
 
-use plotters::prelude::*;
 use serde::Serialize;
 
 use crate::compress::{CompressError, Options};
@@ -111,80 +110,6 @@ pub fn mark_pareto(outcomes: &mut [Outcome]) {
     }
 }
 
-/// Size of the picture \[px\].
-const SIZE: (u32, u32) = (720, 440);
-
-/// Bytes (logarithmic) against settling time as an SVG, every point with its variant; the front is
-/// filled.
-///
-/// # Errors
-/// What the drawing library could not draw.
-pub fn svg(outcomes: &[Outcome]) -> Result<String, String> {
-    let mut text = String::new();
-    draw(outcomes, &mut text).map_err(|error| error.to_string())?;
-    Ok(text)
-}
-
-fn draw(outcomes: &[Outcome], text: &mut String) -> Result<(), Box<dyn std::error::Error>> {
-    let points: Vec<(f64, f64, &Outcome)> = outcomes
-        .iter()
-        .filter_map(|o| Some((o.table_bytes? as f64, o.settle_s?, o)))
-        .collect();
-    let ends = |values: &dyn Fn(&(f64, f64, &Outcome)) -> f64, empty: (f64, f64)| {
-        let found = points.iter().map(values);
-        let bounds = (f64::INFINITY, f64::NEG_INFINITY);
-        match found.fold(bounds, |(a, b), x| (a.min(x), b.max(x))) {
-            (least, most) if least <= most => (least, most),
-            _ => empty,
-        }
-    };
-    let (fewest, most) = ends(&|point| point.0, (100.0, 1000.0));
-    let (soonest, latest) = ends(&|point| point.1, (0.0, 60.0));
-    // Whole decades: only those carry a label.
-    let decade = |power: f64| 10f64.powf(power);
-    let room = (0.1 * (latest - soonest)).max(0.5);
-    let root = SVGBackend::with_string(text, SIZE).into_drawing_area();
-    root.fill(&WHITE)?;
-    let mut chart = ChartBuilder::on(&root)
-        .margin(12)
-        .x_label_area_size(44)
-        .y_label_area_size(56)
-        .build_cartesian_2d(
-            (decade(fewest.log10().floor())..decade((most * 1.01).log10().ceil())).log_scale(),
-            soonest - room..latest + room,
-        )?;
-    chart
-        .configure_mesh()
-        .max_light_lines(1)
-        .x_desc("table [bytes]; filled: nothing is smaller, faster and bears more")
-        .y_desc("worst time to I2 [s]")
-        .x_label_formatter(&|bytes| format!("{bytes:.0}"))
-        .draw()?;
-    let blue = RGBColor(0x1f, 0x5f, 0xa8);
-    chart.draw_series(points.iter().map(|(bytes, settle_s, outcome)| {
-        let style = ShapeStyle {
-            color: blue.to_rgba(),
-            filled: outcome.pareto,
-            stroke_width: 1,
-        };
-        Circle::new((*bytes, *settle_s), 5, style)
-    }))?;
-    chart.draw_series(points.iter().map(|(bytes, settle_s, outcome)| {
-        let Variant {
-            width_factor,
-            period_s,
-            participation,
-        } = outcome.variant;
-        let label = format!(
-            "x{width_factor}, {period_s} s, ±{:.0} %",
-            100.0 * participation
-        );
-        EmptyElement::at((*bytes, *settle_s)) + Text::new(label, (8, -14), ("sans-serif", 13))
-    }))?;
-    root.present()?;
-    Ok(())
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -214,15 +139,5 @@ mod tests {
         ];
         mark_pareto(&mut outcomes);
         assert_eq!(outcomes.map(|o| o.pareto), [true, true, false, true]);
-    }
-
-    #[test]
-    fn the_picture_names_every_variant_that_has_a_table() {
-        let mut outcomes = [outcome(0.0, 2000, 20.0), outcome(0.1, 9000, 30.0)];
-        mark_pareto(&mut outcomes);
-        let picture = svg(&outcomes).unwrap();
-        assert_eq!(picture.matches("<circle").count(), 2);
-        assert!(picture.contains("x1, 1 s, ±0 %") && picture.contains("x1, 1 s, ±10 %"));
-        assert!(svg(&[]).unwrap().contains("worst time to I2"));
     }
 }

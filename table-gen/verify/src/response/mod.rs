@@ -19,11 +19,13 @@
 //! | for ever | `for_ever` |
 //! | what the spec's meter makes of f | `meter` |
 //! | one case; all cases of a proof, in parallel | `cases`, `plan` |
+//! | the same for the droop, should every charger fall back to it | `fallback` |
 //! | from the bytes to the claims | `proof` |
 
 mod adjoint;
 mod cases;
 mod event;
+mod fallback;
 mod fleet_loop;
 mod for_ever;
 mod lines;
@@ -38,5 +40,5 @@ mod window;
 pub use cases::{Case, Found, Resolution, examine};
 pub use fleet_loop::{Assumed, FleetLoop, Law, LossProfile, PlantBand};
 pub use meter::error_hz;
-pub use plan::{Summary, cases, examine_all};
+pub use plan::{LOSS_BAND_GW, Summary, cases, examine_all};
 pub use proof::{Proof, verify};

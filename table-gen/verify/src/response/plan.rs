@@ -7,7 +7,7 @@ use super::cases::{Case, Found, Resolution, examine};
 use super::fleet_loop::{LossProfile, PlantBand};
 
 /// Width of a band of the loss \[GW\].
-const LOSS_BAND_GW: f64 = 0.04;
+pub const LOSS_BAND_GW: f64 = 0.04;
 /// Widths of the cells of unknown parameters: 1/H relative to its middle, K relative to it, D
 /// \[GW/Hz\].
 const INERTIA_CELL: f64 = 0.06;
@@ -37,8 +37,8 @@ pub struct Summary {
     pub found: Vec<(Case, Option<Found>)>,
 }
 
-/// The cases of a band of losses and a band of plants.
-pub fn cases(all: &Case) -> Vec<Case> {
+/// The cases of a band of losses, cut into bands of a width \[GW\], and a band of plants.
+pub fn cases(all: &Case, loss_band_gw: f64) -> Vec<Case> {
     let inverse = |h: Interval| 1.0 / h.mid();
     let inertia = &all.plant.inertia;
     let inertia_cells = split(
@@ -50,7 +50,7 @@ pub fn cases(all: &Case) -> Vec<Case> {
     let dampings = split(all.plant.damping, DAMPING_CELL_GW_PER_HZ);
     let losses = match all.assumed.profile {
         LossProfile::Band => vec![all.assumed.loss],
-        LossProfile::Constant | LossProfile::NonDecreasing => split(all.assumed.loss, LOSS_BAND_GW),
+        LossProfile::Constant | LossProfile::NonDecreasing => split(all.assumed.loss, loss_band_gw),
     };
     let mut out = Vec::new();
     for inverse_inertia in &inertia_cells {
@@ -115,10 +115,11 @@ const TOGETHER: usize = 8;
 /// told the share that is done and may end it: then nothing comes back.
 pub fn examine_all(
     all: &Case,
+    loss_band_gw: f64,
     enough: &(dyn Fn(&Found) -> bool + Sync),
     go_on: &dyn Fn(f64) -> bool,
 ) -> Option<Summary> {
-    let cases = cases(all);
+    let cases = cases(all, loss_band_gw);
     let resolutions: &[Resolution] = match all.assumed.profile {
         LossProfile::Constant => &CONSTANT,
         LossProfile::NonDecreasing | LossProfile::Band => &MOVING,
@@ -161,14 +162,14 @@ mod tests {
             last: Interval::hull(0.0, 2.2),
         };
         all.assumed.loss = all.last;
-        let found = cases(&all);
+        let found = cases(&all, LOSS_BAND_GW);
         assert_eq!(found.len(), 55);
         assert_eq!(found[0].plant, plant());
         for pair in found.windows(2) {
             assert_eq!(pair[0].last.high, pair[1].last.low);
         }
         all.plant.inertia = Interval::hull(2.0, 4.0);
-        let found = cases(&all);
+        let found = cases(&all, LOSS_BAND_GW);
         let lowest = found
             .iter()
             .map(|c| c.plant.inertia.low)

@@ -12,9 +12,10 @@ use model::spec::Spec;
 use model::verdict::{Claim, ClaimName, Counts, Method};
 
 use super::cases::{Case, Found};
+use super::fallback;
 use super::fleet_loop::{Assumed, Law, LossProfile, PlantBand};
 use super::meter;
-use super::plan::{Summary, examine_all};
+use super::plan::{LOSS_BAND_GW, Summary, examine_all};
 use crate::VerifyError;
 
 /// What was found about a response.
@@ -65,9 +66,18 @@ pub fn verify(
             .is_none_or(|limit| found.f.low >= limit)
             && found.inside_from_s(inner).is_some()
     };
-    let summary = examine_all(&all, &enough, go_on).ok_or(VerifyError::Interrupted)?;
+    // The droop takes about a third of the whole.
+    let droop_too = all.assumed.profile == LossProfile::Constant;
+    let share = if droop_too { 0.7 } else { 1.0 };
+    let summary = examine_all(&all, LOSS_BAND_GW, &enough, &|done| go_on(share * done))
+        .ok_or(VerifyError::Interrupted)?;
     let (found, counts) = judged(&summary, spec);
     claims.extend(found);
+    if droop_too {
+        let go_on = |done| go_on(share + (1.0 - share) * done);
+        let claim = fallback::claim(&all, table.header().droop, &go_on);
+        claims.push(claim.ok_or(VerifyError::Interrupted)?);
+    }
     Ok(Proof {
         claims,
         method: Method::FleetBounds,
