@@ -48,7 +48,13 @@ fn is_about(verdict: &Verdict, bytes: &[u8], spec: &Spec) -> bool {
 #[test]
 fn every_shipped_table_regenerates_and_is_proven() {
     let names = names();
-    let needed = ["paper-bi", "paper-uni", "gb-bi", "gb-bi-band", "gb-bi-delay"];
+    let needed = [
+        "paper-bi",
+        "paper-uni",
+        "gb-bi",
+        "gb-bi-band",
+        "gb-bi-delay",
+    ];
     for needed in needed.iter().chain(&VARIANTS) {
         assert!(
             names.iter().any(|name| name == needed),

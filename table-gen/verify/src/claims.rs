@@ -2,7 +2,7 @@
 
 use super::closed_loop::Model;
 use super::outcome::{Outcome, Violation};
-use super::{dispatch, header, image};
+use super::{delayed_loop, dispatch, header, image};
 use firmware::table::{Law, TableView};
 use model::spec::Spec;
 use model::verdict::{Claim, ClaimName};
@@ -19,7 +19,8 @@ pub(super) struct Findings<'a> {
 
 /// That the table is the one that the spec asks for, and that the device can use it.
 pub(super) fn header(table: &TableView<'_>, spec: &Spec) -> Claim {
-    let differences = header::differences(table, spec);
+    let mut differences = header::differences(table, spec);
+    differences.extend(delayed_loop::misrounded(table, spec));
     Claim {
         name: ClaimName::Header,
         holds: differences.is_empty(),

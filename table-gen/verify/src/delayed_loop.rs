@@ -71,6 +71,35 @@ pub(crate) fn closed_loop(table: &TableView<'_>, spec: &Spec) -> Model {
     model
 }
 
+/// A coefficient of the prediction that is not the nearest to what it stands for, if there is one.
+///
+/// The proof bears any coefficient, at the price of ρ; but a table whose coefficients are not those
+/// of its spec is another table.
+pub(crate) fn misrounded(table: &TableView<'_>, spec: &Spec) -> Option<String> {
+    /// Half of the last place, and the rounding of that comparison.
+    const HALF: f64 = 0.5 + 1e-9;
+    let part = table.prediction()?;
+    let model = Model::without_delay(table, spec);
+    let expected: Vec<Interval> = commands(table)
+        .map(|ppm| expected_power(spec, ppm))
+        .collect();
+    let ticks = u32::from(table.header().delay_ticks);
+    for d in 0..STATES {
+        let coefficients = coefficients(table, &part, &model, &expected, ticks, d);
+        let off = coefficients.into_iter().find(|one| {
+            let off = one.stored - one.exact;
+            (off.mid().abs() - off.radius()) * one.scale > HALF
+        });
+        if let Some(one) = off {
+            return Some(format!(
+                "the prediction's coefficient {} of state {d} is not the spec's",
+                one.name
+            ));
+        }
+    }
+    None
+}
+
 /// What is known in a loop whose commands act `ticks` late. `expected` is the net power \[kW\] of
 /// each level as the device expects it.
 fn of_prediction(
@@ -189,31 +218,53 @@ fn estimates(model: &Model, time_s: f64, reach: &[f64; STATES]) -> ([f64; STATES
     (bound, inside)
 }
 
-/// ρ: the table's coefficients against enclosures of what they stand for, and the floor of the
-/// measured state. The final floor moves no state out of its cell.
-fn rho(
+/// A coefficient as it is stored, beside an enclosure of what it stands for.
+struct Coefficient {
+    name: &'static str,
+    stored: Interval,
+    exact: Interval,
+    /// Last places in a unit.
+    scale: f64,
+    /// Bound of what it is multiplied with.
+    of: f64,
+}
+
+/// The coefficients of one state: of the loss, of the estimate, of each command under way.
+fn coefficients(
     table: &TableView<'_>,
     part: &PredictionView<'_>,
     model: &Model,
     expected: &[Interval],
-    estimates: &[f64; STATES],
     ticks: u32,
-) -> [f64; STATES] {
+    d: usize,
+) -> Vec<Coefficient> {
     let header = table.header();
-    let value = |stored: i32, bits: u32| {
-        Interval::point(f64::from(stored)) / Interval::point(f64::from(1u32 << bits))
+    let at = |name, stored: i32, bits: u32, exact, of| Coefficient {
+        name,
+        stored: Interval::point(f64::from(stored)) / Interval::point(f64::from(1u32 << bits)),
+        exact,
+        scale: f64::from(1u32 << bits),
+        of,
     };
     let delay_s = f64::from(u32::from(header.tick_ms) * ticks) / 1000.0;
     let flow = Flow::over(&model.a, &model.b, delay_s);
     let none = expected.first().copied().unwrap_or(Interval::ZERO);
-    let mut rho = [0.0; STATES];
-    for (d, rho) in rho.iter_mut().enumerate() {
-        *rho = (value(part.loss(d), 0) - flow.gamma[d] * none).magnitude();
-        for j in 0..STATES {
-            let stored = value(part.phi(d, j), PHI_FRACTION_BITS);
-            let off = (stored - flow.phi[d][j]).magnitude();
-            *rho = up(up(*rho + up(off * estimates[j])) + stored.magnitude());
-        }
+    let mut all = vec![at(
+        "of the loss",
+        part.loss(d),
+        0,
+        flow.gamma[d] * none,
+        1.0,
+    )];
+    for j in 0..STATES {
+        let stored = part.phi(d, j);
+        all.push(at(
+            "of the estimate",
+            stored,
+            PHI_FRACTION_BITS,
+            flow.phi[d][j],
+            0.0,
+        ));
     }
     // The power of one level, and of the last, which is as many times that.
     let last = usize::from(header.levels) - 1;
@@ -224,13 +275,39 @@ fn rho(
     let tick = &model.tick.flow;
     let mut response = tick.gamma.map(|gamma| gamma * level);
     for ago in 1..=ticks as usize {
-        for (d, rho) in rho.iter_mut().enumerate() {
-            let off = value(part.level(ago, d), RESPONSE_FRACTION_BITS) - response[d];
-            *rho = up(*rho + up(off.magnitude() * last as f64));
-        }
+        let stored = part.level(ago, d);
+        let bits = RESPONSE_FRACTION_BITS;
+        all.push(at("of a command", stored, bits, response[d], last as f64));
         response = apply(&tick.phi, &response);
     }
-    rho
+    all
+}
+
+/// ρ: the table's coefficients against enclosures of what they stand for, and the floor of the
+/// measured state. The final floor moves no state out of its cell.
+fn rho(
+    table: &TableView<'_>,
+    part: &PredictionView<'_>,
+    model: &Model,
+    expected: &[Interval],
+    estimates: &[f64; STATES],
+    ticks: u32,
+) -> [f64; STATES] {
+    std::array::from_fn(|d| {
+        let all = coefficients(table, part, model, expected, ticks, d);
+        let mut sum = 0.0;
+        for (at, one) in all.iter().enumerate() {
+            let off = (one.stored - one.exact).magnitude();
+            // The first is a sum by itself, those of the estimate follow it, state by state.
+            sum = match at.checked_sub(1) {
+                Some(j) if j < STATES => {
+                    up(up(sum + up(off * estimates[j])) + one.stored.magnitude())
+                }
+                _ => up(sum + up(off * one.of)),
+            };
+        }
+        sum
+    })
 }
 
 /// `Σ |row_j| e_j`, rounded up.
