@@ -1,6 +1,8 @@
 //! The command line of Holdfast; see [`cli`].
 #![forbid(unsafe_code)]
 
+#[cfg(test)]
+mod build_id;
 mod cli;
 
 use std::process::ExitCode;

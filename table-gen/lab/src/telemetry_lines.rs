@@ -66,12 +66,14 @@ pub struct Summary {
     pub other_version: u64,
 }
 
-fn phase_name(phase: u8) -> &'static str {
+/// Name of a phase by its number in a frame, `?` for an unknown one.
+pub fn phase_name(phase: u8) -> &'static str {
     let known = Phase::ALL.get(usize::from(phase)).copied();
     known.map_or("?", Phase::name)
 }
 
-fn mode_name(mode: u8) -> &'static str {
+/// Name of a mode by its number in a frame, `?` for an unknown one.
+pub fn mode_name(mode: u8) -> &'static str {
     match Mode::ALL.get(usize::from(mode)) {
         Some(Mode::WarmUp) => "warm-up",
         Some(Mode::Table) => "table",
@@ -85,7 +87,13 @@ fn mode_name(mode: u8) -> &'static str {
     }
 }
 
-fn set_point(set_point: WireSetPoint) -> String {
+/// Lost power \[GW\], `-` while it is not known.
+pub fn loss_text(loss_kw: Option<i32>) -> String {
+    loss_kw.map_or_else(|| "-".into(), |kw| format!("{:.2}", f64::from(kw) * 1e-6))
+}
+
+/// A set-point with its unit.
+pub fn set_point(set_point: WireSetPoint) -> String {
     match set_point {
         WireSetPoint::Unknown => "refused".into(),
         WireSetPoint::Paused => "paused".into(),
@@ -119,9 +127,7 @@ pub const HEADING: &str = "    time s        f Hz   g GW   l GW   p GW   w GW   
 /// One line of a tick.
 pub fn line(frame: &Frame) -> String {
     let [f, g, l, p] = frame.state.map(|value| f64::from(value) * 1e-6);
-    let loss = frame
-        .loss_kw
-        .map_or_else(|| "-".into(), |kw| format!("{:.2}", f64::from(kw) * 1e-6));
+    let loss = loss_text(frame.loss_kw);
     let mut text = String::new();
     // Writing to a String cannot fail.
     let _ = write!(

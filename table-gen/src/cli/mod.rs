@@ -16,6 +16,7 @@ mod falsify;
 mod files;
 mod fleet;
 mod formula;
+mod groups;
 mod inspect;
 mod keys;
 mod monitor;
@@ -42,11 +43,19 @@ use std::process::ExitCode;
 pub(crate) use arguments::{OutputArgs, Overrides, SpecArgs};
 pub(crate) use failure::Failure;
 
-use clap::{Parser, Subcommand};
+use clap::{CommandFactory as _, FromArgMatches as _, Parser, Subcommand};
+
+/// Version, the commit that it was built on, and whether the source was changed since.
+const VERSION: &str = concat!(env!("CARGO_PKG_VERSION"), " (", env!("HOLDFAST_BUILD"), ")");
+
+#[cfg(test)]
+pub(crate) const fn version() -> &'static str {
+    VERSION
+}
 
 /// Synthesises, compresses, verifies and simulates frequency-response tables for EV chargers.
 #[derive(Debug, Parser)]
-#[command(name = "table-gen", version, max_term_width = 110)]
+#[command(name = "table-gen", version = VERSION, max_term_width = 110)]
 struct Cli {
     #[command(subcommand)]
     command: Command,
@@ -77,7 +86,7 @@ enum Command {
     Falsify(falsify::FalsifyArgs),
     /// A requirement in temporal logic: as games of a spec, or as a monitor of a recorded frequency
     Formula(formula::FormulaArgs),
-    /// Show a charger's telemetry, live from a serial port or from a recording
+    /// Show chargers' telemetry, live or from recordings: as lines, or as a page
     Monitor(monitor::MonitorArgs),
     /// The fallback droop and the event's end as messages of OCPP 2.1, and back
     Ocpp(ocpp::OcppArgs),
@@ -91,7 +100,10 @@ enum Command {
 
 /// Runs the command line of this process.
 pub(crate) fn run() -> ExitCode {
-    let cli = match Cli::try_parse() {
+    let parsed = groups::grouped(Cli::command())
+        .try_get_matches()
+        .and_then(|matches| Cli::from_arg_matches(&matches));
+    let cli = match parsed {
         Ok(cli) => cli,
         Err(error) => {
             // clap's own codes: 0 for help and version, 2 for bad usage.

@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use firmware::table::TableView;
 use serde::Serialize;
 
+use super::files::write_one;
 use super::record::RecordArgs;
 use super::{Failure, OutputArgs, output, plot, run_tables};
 use lab::replay::{FaultCount, REACTION_STEP_MAX_S, Replay, replay};
@@ -20,6 +21,9 @@ pub(super) struct ReplayArgs {
     /// Write time, frequency and participation of every tick as CSV
     #[arg(long, value_name = "FILE")]
     csv: Option<PathBuf>,
+    /// Write the charger's telemetry, a frame a tick: a recording for monitor
+    #[arg(long, value_name = "FILE")]
+    telemetry: Option<PathBuf>,
     /// Draw the recorded frequency in the terminal
     #[arg(long)]
     plot: bool,
@@ -52,6 +56,9 @@ pub(super) fn run(args: &ReplayArgs) -> Result<(), Failure> {
         .map_err(|error| Failure::BadInput(format!("the charger rejects the table: {error:?}")))?;
     if let Some(path) = &args.csv {
         write_csv(path, &result)?;
+    }
+    if let Some(path) = &args.telemetry {
+        write_one(path, &result.telemetry)?;
     }
     let reaction_s = result.reaction_s();
     let report = ReplayReport {

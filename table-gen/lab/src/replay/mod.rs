@@ -11,6 +11,7 @@ use firmware::charger::{Charger, ChargerConfig, Report, Watchdog, trust_ticks};
 use firmware::dispatch::{Dispatch, DispatchError, SetPoint};
 use firmware::fault::{Faults, ResetCause};
 use firmware::table::{TableError, TableView};
+use firmware::telemetry::{FRAME_MAX, Frame, TableId, encode};
 use firmware::units::{MICRO, Participation};
 use serde::Serialize;
 
@@ -67,6 +68,8 @@ pub struct Replay {
     pub max_participation: f64,
     /// Faults that occurred.
     pub faults: Vec<FaultCount>,
+    /// What the charger would have sent on its serial line, a frame a tick.
+    pub telemetry: Vec<u8>,
 }
 
 impl Replay {
@@ -129,7 +132,7 @@ pub fn replay(table: &TableView<'_>, record: &Record) -> Result<Replay, TableErr
         tick();
     }
     let ticks = (record.end_s() / tick_s + 1e-6).floor() as usize;
-    let mut seen = Seen::new(record.nominal_hz, tick_s, ticks);
+    let mut seen = Seen::new(record.nominal_hz, tick_s, ticks, TableId::of(table));
     for index in 0..=ticks {
         seen.note(index, &tick());
     }
@@ -143,16 +146,20 @@ struct Seen {
     samples: Vec<ReplaySample>,
     phases: Vec<PhaseSpan>,
     fault_ticks: [usize; Faults::NAMES.len()],
+    table: TableId,
+    telemetry: Vec<u8>,
 }
 
 impl Seen {
-    fn new(nominal_hz: f64, tick_s: f64, ticks: usize) -> Self {
+    fn new(nominal_hz: f64, tick_s: f64, ticks: usize, table: TableId) -> Self {
         Self {
             nominal_hz,
             tick_s,
             samples: Vec::with_capacity(ticks + 1),
             phases: Vec::new(),
             fault_ticks: [0; Faults::NAMES.len()],
+            table,
+            telemetry: Vec::new(),
         }
     }
 
@@ -162,6 +169,9 @@ impl Seen {
         for (ticks, (fault, _)) in self.fault_ticks.iter_mut().zip(Faults::NAMES) {
             *ticks += usize::from(report.faults.contains(fault));
         }
+        let frame = Frame::new(report, Some(self.table));
+        self.telemetry
+            .extend_from_slice(encode(&frame, &mut [0; FRAME_MAX]));
         let share = |micro: f64| micro / f64::from(MICRO);
         self.samples.push(ReplaySample {
             time_s,
@@ -197,6 +207,7 @@ impl Seen {
             false_triggers,
             max_participation,
             faults,
+            telemetry: self.telemetry,
         }
     }
 }
@@ -229,6 +240,7 @@ fn onset(record: &Record) -> Option<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::telemetry_lines::Splitter;
 
     /// A record of these frequencies.
     pub(super) fn record(hz: &[f64], step_s: f64) -> Record {
@@ -278,6 +290,25 @@ mod tests {
             assert_eq!(found.faults, [expected], "{step_s} s");
             assert_eq!(found.max_participation, 0.0, "{step_s} s");
             assert_eq!(found.onset_s, None, "{step_s} s");
+        }
+    }
+
+    #[test]
+    fn telemetry_says_what_the_samples_say() {
+        let hz: Vec<f64> = (0..20).map(|k| 50.0 - 0.05 * f64::from(k)).collect();
+        let found = replayed(&record(&hz, 1.0));
+        let mut frames = Vec::new();
+        Splitter::default().push(&found.telemetry, |stretch| frames.push(stretch.unwrap()));
+        assert_eq!(frames.len(), found.samples.len());
+        assert!(found.max_participation > 0.0);
+        for (frame, sample) in frames.iter().zip(&found.samples) {
+            let [f_hz, participation] = [
+                f64::from(frame.state[0]),
+                f64::from(frame.participation_ppm),
+            ]
+            .map(|micro| micro / f64::from(MICRO));
+            assert_eq!(50.0 + f_hz, sample.frequency_hz);
+            assert_eq!(participation, sample.participation);
         }
     }
 
