@@ -10,9 +10,13 @@ use std::process::Command;
 use std::sync::OnceLock;
 
 use firmware::table::TableView;
+use lab::compare::chargers::ChargersConfig;
+use lab::compare::{CompareConfig, compare};
+use lab::fleet::FleetConfig;
+use lab::report::digits;
 use lab::report::figure::thin;
 use lab::report::study::{BaselineEvent, Study, frequency, steady_states};
-use lab::report::{Findings, Rendered, render_studies};
+use lab::report::{Findings, FleetFinding, Rendered, render_studies};
 use lab::simulation::closed_loop::{Estimator, simulate};
 use lab::simulation::scenario::Scenario;
 use lab::simulation::trajectory::Run;
@@ -31,7 +35,25 @@ fn study() -> &'static Study {
     })
 }
 
-fn rendered() -> Rendered {
+/// What other commands found, each with something to show.
+fn findings() -> &'static Findings {
+    static FINDINGS: OnceLock<Findings> = OnceLock::new();
+    FINDINGS.get_or_init(find)
+}
+
+fn find() -> Findings {
+    let spec = &study().spec;
+    let table = TableView::parse(&study().table).unwrap();
+    let config = CompareConfig {
+        losses_gw: vec![1.0, 2.0],
+        duration_s: 60.0,
+        chargers: ChargersConfig::of(spec, 10),
+        ..CompareConfig::of(spec)
+    };
+    let found = compare(spec, &table, &config, &|| true).unwrap();
+    let fleet = FleetConfig::sound(spec, 10);
+    let scenario = Scenario::of(spec);
+    let run = lab::fleet::run(spec, &table, &fleet, &scenario, &|| true).unwrap();
     let verdict = Verdict {
         verified: false,
         spec: "spec <&>".to_owned(),
@@ -47,13 +69,21 @@ fn rendered() -> Rendered {
         tool_version: String::new(),
         failures: Vec::new(),
     };
-    let findings = Findings {
+    Findings {
         verdict: Some(verdict),
-        budget: Some(synth::budget::budget(
-            &TableView::parse(&study().table).unwrap(),
-        )),
-    };
-    render_studies(std::slice::from_ref(study()), &findings, Vec::new()).unwrap()
+        budget: Some(synth::budget::budget(&table)),
+        scorecard: Some((config, found)),
+        fleet: Some(FleetFinding {
+            config: fleet,
+            loss_gw: scenario.loss_gw,
+            duration_s: scenario.duration_s,
+            run,
+        }),
+    }
+}
+
+fn rendered() -> Rendered {
+    render_studies(std::slice::from_ref(study()), findings(), Vec::new()).unwrap()
 }
 
 #[test]
@@ -66,11 +96,17 @@ fn numbers_are_those_of_simulate() {
     let page = rendered().html;
     let summary = &run.summary;
     for number in [
-        format!("<td>{:.4}</td>", summary.nadir_hz),
-        format!("<td>{:.4}</td>", summary.final_hz),
-        format!("<td>{:.2}</td>", summary.entered_outer_s.unwrap()),
-        format!("<td>{:.2}</td>", summary.entered_inner_s.unwrap()),
-        format!("<td>{:.3}</td>", summary.max_participation),
+        format!("<td>{:.3}</td>", summary.nadir_hz),
+        format!("<td>{:.3}</td>", summary.final_hz),
+        format!(
+            "<td>{}</td>",
+            digits::four(summary.entered_outer_s.unwrap())
+        ),
+        format!(
+            "<td>{}</td>",
+            digits::four(summary.entered_inner_s.unwrap())
+        ),
+        format!("<td>{}</td>", digits::four(summary.max_participation)),
     ] {
         assert!(page.contains(&number), "{number}");
     }
@@ -79,12 +115,75 @@ fn numbers_are_those_of_simulate() {
 }
 
 #[test]
+fn the_page_begins_with_the_answer() {
+    let page = rendered().html;
+    let headings: Vec<&str> = page
+        .split("<h2>")
+        .skip(1)
+        .filter_map(|rest| rest.split("</h2>").next())
+        .collect();
+    let first = ["The answer", "Scorecard", "The fleet"].map(|word| format!("{word}: paper-bi"));
+    assert_eq!(headings[..3], first, "{headings:?}");
+    let answer = page.split("<h2>").nth(1).unwrap();
+    for words in [
+        // The verdict of the fixture is a no.
+        "NOT proven",
+        "f never below 49.2 Hz; back in 49.85 to 50 Hz within 60 s; claimed over 120 s.",
+        "For: a loss of 2 GW, H = 4 GW s/Hz",
+        "Lowest frequency against the droop's: ",
+        " times (at most ",
+        "its contactor operates ",
+    ] {
+        assert!(answer.contains(words), "{words}: {answer}");
+    }
+}
+
+/// The words of a page: without drawings, style, what is folded away, and tags.
+fn words_of(page: &str) -> String {
+    let mut text = page.to_owned();
+    for tag in ["style", "svg", "details"] {
+        let (open, close) = (format!("<{tag}"), format!("</{tag}>"));
+        while let Some(start) = text.find(&open) {
+            // Details are not nested here, so the first end is the one.
+            let end = start + text[start..].find(&close).unwrap() + close.len();
+            text.replace_range(start..end, " ");
+        }
+    }
+    text.split('<')
+        .filter_map(|part| part.split_once('>'))
+        .map(|(_, words)| words)
+        .collect::<Vec<_>>()
+        .join(" ")
+}
+
+#[test]
+fn numbers_have_at_most_four_digits() {
+    let page = rendered().html;
+    let mut measured = 0;
+    for word in words_of(&page).split(|c: char| !(c.is_ascii_digit() || c == '.')) {
+        let word = word.trim_end_matches('.');
+        let Some((whole, decimals)) = word.split_once('.') else {
+            continue;
+        };
+        measured += 1;
+        // A frequency goes down to the millihertz, and a version has two points.
+        let frequency = whole.len() == 2 && decimals.len() <= 3;
+        let digits = [whole, decimals].concat();
+        let digits = digits.trim_start_matches('0').len();
+        assert!(frequency || digits <= 4 || decimals.contains('.'), "{word}");
+    }
+    assert!(measured > 100, "{measured}");
+}
+
+#[test]
 fn the_same_study_gives_the_same_files() {
-    assert_eq!(rendered(), rendered());
+    // Compared without being printed: the files are long.
+    assert!(rendered() == rendered());
     let again = Study::new(&study().spec, &study().table, RUNS).unwrap();
-    let files = render_studies(&[again], &Findings::default(), Vec::new()).unwrap();
+    let files = render_studies(&[again], &find(), Vec::new()).unwrap();
+    assert_eq!(files.figures.len(), rendered().figures.len());
     for (figure, other) in files.figures.iter().zip(rendered().figures) {
-        assert_eq!(*figure, other);
+        assert!(*figure == other, "{}", figure.id);
     }
 }
 
@@ -130,7 +229,14 @@ fn figures_stand_alone() {
         );
         assert!(figure.svg.contains("<title id=") && figure.svg.contains("<style>"));
         assert!(!figure.svg.contains("http://") || figure.svg.matches("http://").count() == 1);
-        assert!(figure.csv.lines().count() > 1000, "{}", figure.id);
+        let lines = figure.csv.lines().count();
+        // Four controllers at two losses, under a heading; else a point each tenth of a second.
+        let expected = if figure.id.contains("-compare-") {
+            9..=9
+        } else {
+            1001..=usize::MAX
+        };
+        assert!(expected.contains(&lines), "{}: {lines}", figure.id);
         assert!(figure.svg.contains("<polyline"), "{}", figure.id);
     }
 }
@@ -150,15 +256,36 @@ addEventListener('load', () => {
 });
 </script></body>"#;
 
-/// What the page measures of itself in a browser.
-fn probe(page: &str, dark: bool) -> Value {
+/// A frame as wide as a phone with the page in it, which tells what it found.
+const PHONE: &str = r#"<!DOCTYPE html><title></title><body style="margin: 0"><script>
+onmessage = event => { document.title = event.data; };
+</script><iframe src="report.html" style="width: 390px; height: 844px; border: 0"></iframe></body>"#;
+
+/// Appended to the page in the frame: how wide it is, and the smallest print.
+const PHONE_PROBE: &str = r#"<script>
+addEventListener('load', () => {
+  const shown = [...document.querySelectorAll('p, h1, h2, th, td, caption')];
+  const sizes = shown.map(e => parseFloat(getComputedStyle(e).fontSize));
+  const wide = shown.filter(e => !e.closest('.wide') && e.getBoundingClientRect().right > innerWidth + 1);
+  parent.postMessage(JSON.stringify({inner: innerWidth, scroll: document.documentElement.scrollWidth,
+    smallest: Math.min(...sizes), shown: shown.length, wide: wide.length}), '*');
+});
+</script></body>"#;
+
+/// The title of a page, which a probe has filled with JSON: `report.html` itself, or another page
+/// beside it.
+fn probed(report: &str, other: Option<&str>, dark: bool) -> Value {
     let chromium = ["chromium", "chromium-browser", "google-chrome"]
         .into_iter()
         .find(|name| Command::new(name).arg("--version").output().is_ok())
-        .expect("no Chromium on the search path: `cargo test-all prerequisites` installs it");
+        .expect("no Chromium on the search path; cargo test-all installs it");
     let dir = tempfile::tempdir().unwrap();
-    let path = dir.path().join("report.html");
-    std::fs::write(&path, page.replacen("</body>", PROBE, 1)).unwrap();
+    let mut path = dir.path().join("report.html");
+    std::fs::write(&path, report).unwrap();
+    if let Some(other) = other {
+        path = dir.path().join("other.html");
+        std::fs::write(&path, other).unwrap();
+    }
     let scheme = format!("--blink-settings=preferredColorScheme={}", u8::from(!dark));
     let output = Command::new(chromium)
         .args([
@@ -172,6 +299,8 @@ fn probe(page: &str, dark: bool) -> Value {
             "--disable-sync",
             "--enable-logging=stderr",
             "--window-size=1000,1200",
+            // The clock of the page runs ahead until it has nothing left to do.
+            "--virtual-time-budget=10000",
             "--dump-dom",
         ])
         .arg(scheme)
@@ -196,6 +325,24 @@ fn probe(page: &str, dark: bool) -> Value {
         .replace("&gt;", ">")
         .replace("&amp;", "&");
     serde_json::from_str(&title).unwrap()
+}
+
+/// What a browser makes of the page.
+fn probe(page: &str, dark: bool) -> Value {
+    probed(&page.replacen("</body>", PROBE, 1), None, dark)
+}
+
+#[test]
+fn a_phone_shows_the_page() {
+    let page = rendered().html.replacen("</body>", PHONE_PROBE, 1);
+    let found = probed(&page, Some(PHONE), false);
+    assert_eq!(found["inner"], 390);
+    // Nothing scrolls sideways but tables and drawings inside their own frames.
+    assert!(found["scroll"].as_u64().unwrap() <= 390, "{found}");
+    assert_eq!(found["wide"], 0, "{found}");
+    assert!(found["shown"].as_u64().unwrap() > 100, "{found}");
+    // 16 px is the size of the page's text; below 12 px it has to be enlarged to be read.
+    assert!(found["smallest"].as_f64().unwrap() >= 12.0, "{found}");
 }
 
 #[test]

@@ -11,11 +11,12 @@ use serde::Serialize;
 
 use super::checkpoint::CheckpointArgs;
 use super::files::write_all;
+use super::report::fleet_of;
 use super::synth_report::SynthReport;
 use super::{Failure, OutputArgs, SpecArgs, compare, output, progress, run_tables, verify};
 use lab::compare::CompareConfig;
 use lab::compare::verdict::Verdict;
-use lab::report::{self, Findings, scorecard};
+use lab::report::{self, FLEET_CHARGERS, Findings};
 use lab::simulation::closed_loop::{self, Estimator};
 use lab::simulation::monitor::Summary;
 use lab::simulation::scenario::Scenario;
@@ -149,9 +150,10 @@ pub(super) fn run(args: &BuildArgs) -> Result<(), Failure> {
     let findings = Findings {
         verdict: Some(verdict.clone()),
         budget: Some(budget),
+        scorecard: Some((config, found)),
+        fleet: Some(fleet_of(&spec, &table, FLEET_CHARGERS)?),
     };
-    let more = vec![scorecard::scorecard(&spec.name, &config, &found)];
-    let page = report::render(&spec, &bytes, &[], &findings, more).map_err(Failure::bad)?;
+    let page = report::render(&spec, &bytes, &[], &findings, Vec::new()).map_err(Failure::bad)?;
     // A table that is not proven must not be flashed by mistake for one that is.
     let table_name = if verdict.verified {
         "table.bin"

@@ -16,7 +16,7 @@ use lab::record::Record;
 use lab::replay;
 use lab::report::section::Section;
 use lab::report::study::Study;
-use lab::report::{self, Findings, ROBUSTNESS_RUNS, scorecard};
+use lab::report::{self, FLEET_CHARGERS, Findings, FleetFinding, ROBUSTNESS_RUNS};
 use lab::simulation::monitor::Summary;
 use lab::simulation::monte_carlo::{RUNS_MAX, Statistics};
 use lab::simulation::scenario::Scenario;
@@ -49,9 +49,9 @@ pub(super) struct ReportArgs {
     trace: Option<PathBuf>,
     #[command(flatten)]
     record: RecordOptions,
-    /// Show a fleet of so many instances of the firmware
-    #[arg(long, value_name = "N")]
-    fleet: Option<usize>,
+    /// Instances of the firmware in the section of the fleet
+    #[arg(long, value_name = "N", default_value_t = FLEET_CHARGERS)]
+    fleet: usize,
     /// Runs of the robustness section
     #[arg(long, value_name = "N", default_value_t = ROBUSTNESS_RUNS)]
     runs: usize,
@@ -80,9 +80,10 @@ pub(super) fn run(args: &ReportArgs) -> Result<(), Failure> {
             args.runs
         )));
     }
-    if let Some(instances) = args.fleet.filter(|n| !(1..=INSTANCES_MAX).contains(n)) {
+    if !(1..=INSTANCES_MAX).contains(&args.fleet) {
         return Err(Failure::BadInput(format!(
-            "--fleet = {instances} is out of range: 1 to {INSTANCES_MAX}"
+            "--fleet = {} is out of range: 1 to {INSTANCES_MAX}",
+            args.fleet
         )));
     }
     let spec = args.spec.load()?;
@@ -94,9 +95,10 @@ pub(super) fn run(args: &ReportArgs) -> Result<(), Failure> {
     for name in companions(args, &spec) {
         specs.push((args.spec.overrides.load(&name)?, None));
     }
-    let findings = Findings {
+    let mut findings = Findings {
         verdict: finding(args, "verdict.json")?,
         budget: finding(args, "budget.json")?,
+        ..Findings::default()
     };
     progress::catch_interrupts();
     let mut studies = Vec::new();
@@ -106,10 +108,11 @@ pub(super) fn run(args: &ReportArgs) -> Result<(), Failure> {
     }
     let mut more = Vec::new();
     if let Some(study) = studies.first() {
-        more.push(scorecard_section(study)?);
-        if let Some(instances) = args.fleet {
-            more.push(fleet_section(study, instances)?);
-        }
+        let config = CompareConfig::of(&study.spec);
+        let table = view(&study.table)?;
+        let found = compare::scorecard_of(&study.spec, &table, &config)?;
+        findings.scorecard = Some((config, found));
+        findings.fleet = Some(fleet_of(&study.spec, &table, args.fleet)?);
         if let Some(record) = &record {
             more.extend(recorded(study, record)?);
         }
@@ -147,36 +150,36 @@ pub(super) fn run(args: &ReportArgs) -> Result<(), Failure> {
     Ok(())
 }
 
-/// The section of the scorecard, at the spec's inertia.
-fn scorecard_section(study: &Study) -> Result<Section, Failure> {
-    let parsed = TableView::parse(&study.table);
-    let table = parsed.map_err(|error| Failure::BadInput(format!("{error:?}")))?;
-    let config = CompareConfig::of(&study.spec);
-    let found = compare::scorecard_of(&study.spec, &table, &config)?;
-    let name = study.spec.name.as_str();
-    Ok(scorecard::scorecard(name, &config, &found))
+fn view(table: &[u8]) -> Result<TableView<'_>, Failure> {
+    TableView::parse(table).map_err(|error| Failure::BadInput(format!("{error:?}")))
 }
 
-/// The section of the fleet, on the scenario of the command `fleet`.
-fn fleet_section(study: &Study, instances: usize) -> Result<Section, Failure> {
-    let parsed = TableView::parse(&study.table);
-    let table = parsed.map_err(|error| Failure::BadInput(format!("{error:?}")))?;
-    let config = FleetConfig::sound(&study.spec, instances);
+/// The fleet at the largest loss of the spec, on the command `fleet`'s scenario.
+pub(super) fn fleet_of(
+    spec: &Spec,
+    table: &TableView<'_>,
+    instances: usize,
+) -> Result<FleetFinding, Failure> {
+    let config = FleetConfig::sound(spec, instances);
     let scenario = Scenario {
         duration_s: fleet::DURATION_S,
-        ..Scenario::of(&study.spec)
+        loss_gw: spec.uncertainty.loss_gw[1],
+        ..Scenario::of(spec)
     };
-    let run = fleet::run(&study.spec, &table, &config, &scenario, &|| {
+    let run = fleet::run(spec, table, &config, &scenario, &|| {
         !progress::interrupted()
     });
-    let run = run.ok_or_else(|| Failure::No("interrupted".to_owned()))?;
-    Ok(report::fleet::fleet(&study.spec.name, &config, &run))
+    Ok(FleetFinding {
+        config,
+        loss_gw: scenario.loss_gw,
+        duration_s: scenario.duration_s,
+        run: run.ok_or_else(|| Failure::No("interrupted".to_owned()))?,
+    })
 }
 
 /// The sections of a recorded event.
 fn recorded(study: &Study, record: &Record) -> Result<Vec<Section>, Failure> {
-    let parsed = TableView::parse(&study.table);
-    let table = parsed.map_err(|error| Failure::BadInput(format!("{error:?}")))?;
+    let table = view(&study.table)?;
     let replay = replay::replay(&table, record)
         .map_err(|error| Failure::BadInput(format!("the charger rejects the table: {error:?}")))?;
     let question = Question::PAPER;

@@ -74,11 +74,16 @@ pub struct Verdict {
     pub defeats: Vec<Defeat>,
 }
 
+/// Difference up to which two numbers of runs of this fleet count as the same \[Hz\].
+pub fn grace_hz(chargers: &ChargersConfig) -> f64 {
+    let spread = chargers.meter_hz * (2.0 / (3.0 * chargers.number as f64)).sqrt();
+    5.0 * spread + MICROHERTZ
+}
+
 impl Verdict {
     /// The defeats of a scorecard that was made with this fleet.
     pub fn of(scorecard: &Scorecard, chargers: &ChargersConfig) -> Self {
-        let spread = chargers.meter_hz * (2.0 / (3.0 * chargers.number as f64)).sqrt();
-        let grace_hz = 5.0 * spread + MICROHERTZ;
+        let grace_hz = grace_hz(chargers);
         let mut out = Self {
             compared: 0,
             defeats: Vec::new(),

@@ -1,58 +1,39 @@
 //! The section of the fleet: what its chargers give together, against what one firmware that knows
 //! the state asks for.
 
+use super::digits;
 use super::figure::{Axis, Curve, Figure, thin};
+use super::findings::FleetFinding;
 use super::palette::Colour;
 use super::responses::summaries;
 use super::section::{DataTable, Section};
-use crate::fleet::{FleetConfig, FleetRun, FleetSample};
+use crate::fleet::FleetSample;
+use crate::fleet::measure::FleetMeasures;
 
 /// Time from one drawn point to the next \[s\].
 const POINT_S: f64 = 0.1;
 
 /// A run of the fleet.
-pub fn fleet(spec: &str, config: &FleetConfig, run: &FleetRun) -> Section {
+pub fn fleet(spec: &str, found: &FleetFinding) -> Section {
+    let (config, run) = (&found.config, &found.run);
     let measures = &run.measures;
     let mut section = Section::new(format!("The fleet: {spec}")).say(format!(
-        "{} instances of the firmware, each with its own meter (within {} Hz), clock, threshold and dispatch; {} of them never \
-         respond. Simulation only: the proof knows one participation.",
-        config.instances, config.noise_hz, measures.failed
+        "{} instances of the firmware, each with its own meter (within {} mHz), clock, delay ({} to {} s), threshold and dispatch; \
+         {} of them never respond.",
+        config.instances,
+        digits::four(1000.0 * config.noise_hz),
+        digits::four(config.delay_s[0]),
+        digits::four(config.delay_s[1]),
+        measures.failed
     ));
-    let chargers = config.instances.to_string();
     section.tables.push(summaries(
-        format!("fleet {spec} --chargers {chargers}"),
+        format!(
+            "fleet {spec} --chargers {} --loss-gw {}",
+            config.instances, found.loss_gw
+        ),
         &[("fleet", &run.summary)],
     ));
-    let mut table = DataTable::new(
-        "What moves at once, and what comes back",
-        &["Measure", "Value"],
-    );
-    for (name, value) in [
-        (
-            "largest rise of the response in a second [GW]",
-            measures.rise_gw_per_s,
-        ),
-        (
-            "largest fall of the response in a second [GW]",
-            measures.fall_gw_per_s,
-        ),
-        (
-            "largest share of chargers that changed in one tick",
-            measures.changed_at_once,
-        ),
-        (
-            "highest frequency after the nadir [Hz]",
-            measures.rebound_hz,
-        ),
-        (
-            "changes of a charger's set-point, on average",
-            measures.changes_mean,
-        ),
-        ("share of ticks without a reading", measures.missed_share),
-    ] {
-        table.row([name.to_owned(), format!("{value:.4}")]);
-    }
-    section.tables.push(table);
+    section.tables.push(wear(measures));
     let curve = |name: &str, colour: Colour, value: fn(&FleetSample) -> f64| {
         let points = run.samples.iter().map(|s| (s.time_s, 100.0 * value(s)));
         Curve {
@@ -81,4 +62,66 @@ pub fn fleet(spec: &str, config: &FleetConfig, run: &FleetRun) -> Section {
         ranges: Vec::new(),
     });
     section
+}
+
+/// What the run asks of the chargers, and what the grid gets back at once.
+fn wear(measures: &FleetMeasures) -> DataTable {
+    let mean = |mean: f64, most: u32, unit: &str| {
+        format!("{} {unit} on average, {most} at most", digits::four(mean))
+    };
+    let rows = [
+        (
+            "changes of a charger's set-point by 5 % or more",
+            mean(
+                measures.changes_per_charger,
+                measures.changes_per_charger_max,
+                "times",
+            ),
+        ),
+        (
+            "changes of a charger's set-point, all",
+            mean(measures.changes_mean, measures.changes_max, "times"),
+        ),
+        (
+            "operations of a charger's contactor",
+            mean(
+                measures.contactor_operations_per_charger,
+                measures.contactor_operations_max,
+                "times",
+            ),
+        ),
+        (
+            "time outside what the proof assumes of a fleet",
+            match measures.outside_proven_hull_s {
+                Some(time_s) => format!("{} s", digits::four(time_s)),
+                None => "not measured: this proof knows one participation".to_owned(),
+            },
+        ),
+        (
+            "largest rise of the response in a second",
+            format!("{} GW", digits::four(measures.rise_gw_per_s)),
+        ),
+        (
+            "largest fall of the response in a second",
+            format!("{} GW", digits::four(measures.fall_gw_per_s)),
+        ),
+        (
+            "most chargers that changed in one tick",
+            format!("{:.0} %", 100.0 * measures.changed_at_once),
+        ),
+        (
+            "highest frequency after the nadir",
+            format!("{} Hz", digits::hz(measures.rebound_hz)),
+        ),
+        (
+            "ticks without a reading",
+            format!("{} %", digits::four(100.0 * measures.missed_share)),
+        ),
+    ];
+    let caption = "What it asks of the chargers, and what comes back at once";
+    let mut table = DataTable::new(caption, &["Measure", "Value"]);
+    for (name, value) in rows {
+        table.row([name.to_owned(), value]);
+    }
+    table
 }

@@ -3,6 +3,9 @@
 //! | module | holds |
 //! |---|---|
 //! | [`study`] | the runs of a spec, the same as `simulate`'s |
+//! | [`answer`] | what a reader wants to know first |
+//! | [`findings`] | results of other commands |
+//! | [`digits`] | numbers as people read them |
 //! | [`section`], [`figure`] | the page as data |
 //! | [`responses`] | the event, the laws against the baseline, their robustness, Table II |
 //! | [`record`] | the recorded event: replay and counterfactual |
@@ -14,10 +17,13 @@
 //! | `curves`, [`palette`], [`chart`] | the drawing |
 //! | [`page`] | the page |
 
+pub mod answer;
 pub mod chart;
 mod curves;
+pub mod digits;
 pub mod failure;
 pub mod figure;
+pub mod findings;
 pub mod fleet;
 pub mod limits;
 pub mod page;
@@ -30,24 +36,16 @@ pub mod scorecard;
 pub mod section;
 pub mod study;
 
-use model::budget::Budget;
+pub use findings::{Findings, FleetFinding};
 use model::spec::Spec;
-use model::verdict::Verdict;
 pub use rendered::{FigureFile, Rendered, ReportError};
 use section::Section;
 use study::Study;
 
-/// Results of other commands that the report shows if they are there.
-#[derive(Debug, Clone, Default)]
-pub struct Findings {
-    /// Of `verify`.
-    pub verdict: Option<Verdict>,
-    /// Of `budget`.
-    pub budget: Option<Budget>,
-}
-
 /// Runs of the robustness section unless asked otherwise.
 pub const ROBUSTNESS_RUNS: usize = 1000;
+/// Chargers of the fleet's section unless asked otherwise.
+pub const FLEET_CHARGERS: usize = 200;
 
 /// The report of a spec and its table, with other specs beside it (such as the other direction of
 /// charging).
@@ -85,7 +83,14 @@ pub fn render_studies(
         Every number can be had again by the command that its caption names.";
     let mut sections = Vec::new();
     if let Some(first) = studies.first() {
-        sections.push(responses::event(&first.spec));
+        let (spec, name) = (&first.spec, first.spec.name.as_str());
+        sections.push(answer::section(spec, findings));
+        sections.extend(
+            (findings.scorecard.iter())
+                .map(|(config, found)| scorecard::scorecard(name, config, found)),
+        );
+        sections.extend(findings.fleet.iter().map(|found| fleet::fleet(name, found)));
+        sections.push(responses::event(spec));
     }
     sections.extend(studies.iter().map(responses::laws));
     sections.push(responses::robustness(studies));

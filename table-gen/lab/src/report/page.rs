@@ -102,7 +102,7 @@ fn figure_markup(figure: &Figure, svg: &str) -> Markup {
     html! {
         figure id=(figure.id) {
             figcaption { (figure.title) }
-            (PreEscaped(svg))
+            div.drawing { (PreEscaped(svg)) }
             p.note { (figure.description) }
             details {
                 summary { "Data" }

@@ -6,6 +6,7 @@ use model::verdict::Verdict;
 use serde::Serialize;
 use sha2::{Digest, Sha256};
 
+use super::digits;
 use super::section::{DataTable, Section};
 use super::study::Study;
 
@@ -24,10 +25,14 @@ pub fn verdict(verdict: Option<&Verdict>) -> Section {
     });
     let mut table = DataTable::new("Claims (verify)", &["Claim", "Answer", "Bound"]);
     for claim in &verdict.claims {
+        let bound = claim.bound.map_or_else(
+            || "–".to_owned(),
+            |bound| format!("{} {}", digits::bound(bound, claim.limit), claim.unit),
+        );
         table.row([
             claim.name.to_string(),
             if claim.holds { "holds" } else { "fails" }.to_owned(),
-            number(claim.bound),
+            bound,
         ]);
     }
     section.tables.push(table);

@@ -1,6 +1,7 @@
 //! The sections of the event: the paper's figures and tables, from the same runs as `simulate`.
 
 use super::curves::{curve, frequency_figure, participation_figure, percent};
+use super::digits;
 use super::figure::{Curve, Figure};
 use super::palette::Colour;
 use super::section::{DataTable, Section};
@@ -24,15 +25,15 @@ pub fn summaries(caption: impl Into<String>, runs: &[(&str, &Summary)]) -> DataT
         "ψ",
     ];
     let mut table = DataTable::new(caption, &header);
-    let time = |value: Option<f64>| value.map_or_else(|| "–".to_owned(), |s| format!("{s:.2}"));
+    let time = |value: Option<f64>| value.map_or_else(|| "–".to_owned(), digits::four);
     for (name, summary) in runs {
         table.row([
             (*name).to_owned(),
-            format!("{:.4}", summary.nadir_hz),
-            format!("{:.2}", summary.nadir_time_s),
-            format!("{:.4}", summary.final_hz),
-            format!("{:.3}", summary.max_participation),
-            format!("{:.2}", summary.seconds_below_49_5),
+            digits::hz(summary.nadir_hz),
+            digits::four(summary.nadir_time_s),
+            digits::hz(summary.final_hz),
+            digits::four(summary.max_participation),
+            digits::four(summary.seconds_below_49_5),
             time(summary.entered_outer_s),
             time(summary.entered_inner_s),
             if summary.stayed_in_inner { "yes" } else { "no" }.to_owned(),
@@ -69,7 +70,7 @@ pub fn event(spec: &Spec) -> Section {
         .map(|(name, colour, run)| curve(name, *colour, frequency(run)))
         .collect();
     let description = format!(
-        "Frequency after the loss of {loss} GW. Without response it falls to {:.4} Hz, with unidirectional chargers to {:.4} Hz, with bidirectional ones to {:.4} Hz.",
+        "Frequency after the loss of {loss} GW. Without response it falls to {:.3} Hz, with unidirectional chargers to {:.3} Hz, with bidirectional ones to {:.3} Hz.",
         event.none.summary.nadir_hz,
         event.unidirectional.summary.nadir_hz,
         event.bidirectional.summary.nadir_hz
@@ -143,7 +144,7 @@ pub fn laws(study: &Study) -> Section {
 
 fn story(name: &str, summary: &Summary, phases: &[PhaseSpan]) -> String {
     let back = |time: Option<f64>, band: &str| match time {
-        Some(s) => format!("is back in {band} after {s:.2} s"),
+        Some(s) => format!("is back in {band} after {} s", digits::four(s)),
         None => format!("does not come back into {band}"),
     };
     let stays = if summary.stayed_in_inner {
@@ -152,9 +153,9 @@ fn story(name: &str, summary: &Summary, phases: &[PhaseSpan]) -> String {
         "and does not stay there"
     };
     format!(
-        "Under {name} the frequency falls to {:.4} Hz at {:.2} s, {}, {} {stays}. {} changes of phase in the run.",
+        "Under {name} the frequency falls to {:.3} Hz at {} s, {}, {} {stays}. {} changes of phase in the run.",
         summary.nadir_hz,
-        summary.nadir_time_s,
+        digits::four(summary.nadir_time_s),
         back(summary.entered_outer_s, "I1"),
         back(summary.entered_inner_s, "I2"),
         phases.len().saturating_sub(1)
@@ -185,7 +186,7 @@ pub fn robustness(studies: &[Study]) -> Section {
         let many = &study.robustness;
         let greatest = |q: &crate::simulation::monte_carlo::statistics::Quantiles| {
             let late =
-                q.at.map_or_else(|| "–".to_owned(), |at| format!("{:.2}", at.max));
+                q.at.map_or_else(|| "–".to_owned(), |at| digits::four(at.max));
             match q.without {
                 0 => late,
                 never => format!("{late}, never in {never}"),
@@ -196,12 +197,12 @@ pub fn robustness(studies: &[Study]) -> Section {
             many.runs.to_string(),
             many.psi.count.to_string(),
             format!(
-                "{:.2} to {:.2}",
-                100.0 * many.psi.low,
-                100.0 * many.psi.high
+                "{} to {}",
+                digits::four(100.0 * many.psi.low),
+                digits::four(100.0 * many.psi.high)
             ),
-            format!("{:.2}", 100.0 * many.stayed_in_inner.share),
-            format!("{:.4}", many.worst.summary.nadir_hz),
+            digits::four(100.0 * many.stayed_in_inner.share),
+            digits::hz(many.worst.summary.nadir_hz),
             greatest(&many.entered_outer_s),
             greatest(&many.entered_inner_s),
             many.worst.seed.to_string(),
@@ -276,8 +277,8 @@ pub fn table_two(spec: &Spec) -> Section {
     for row in steady_states(spec) {
         table.row([
             format!("{:.2}", row.deadband_hz),
-            format!("{:.4}", row.unidirectional_hz),
-            format!("{:.4}", row.bidirectional_hz),
+            digits::hz(row.unidirectional_hz),
+            digits::hz(row.bidirectional_hz),
         ]);
     }
     section.tables.push(table);
