@@ -8,6 +8,7 @@
 
 mod comments;
 mod process;
+mod python;
 mod steps;
 mod summary;
 mod tools;

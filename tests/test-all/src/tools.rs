@@ -40,6 +40,12 @@ const TOOLS: &[Tool] = &[
         why: "runs the firmware on an emulated RISC-V core",
     },
     Tool {
+        // `ensurepip` comes with the second package, and without it there is no environment.
+        programs: &["python3"],
+        packages: &["python3", "python3-venv"],
+        why: "checks licences, and builds and tests the Python package",
+    },
+    Tool {
         programs: &["chromium", "chromium-browser", "google-chrome"],
         packages: &["chromium", "fonts-liberation"],
         why: "opens the HTML report and checks what a reader sees",
@@ -179,7 +185,7 @@ mod tests {
         assert!(
             text.contains("apt-get install -y --no-install-recommends qemu-system-arm chromium")
         );
-        assert!(text.contains("missing: qemu-system-arm, qemu-system-riscv32, chromium"));
+        assert!(text.contains("missing: qemu-system-arm, qemu-system-riscv32, python3, chromium"));
         // Where no list knows either, the last is named.
         assert_eq!(of_this_release("no-such-package|nor-this"), "nor-this");
     }
