@@ -25,6 +25,29 @@
 //! Nothing here allocates, recurses or panics; nothing is `unsafe`. Everything that decides is
 //! integer arithmetic, so the host's abstraction and verifier, the simulator and the charger
 //! compute the same bits.
+//!
+//! # From the bytes of a table to a participation
+//! ```
+//! use firmware::control_loop::ControlLoop;
+//! use firmware::units::State;
+//!
+//! let bytes = include_bytes!(concat!(env!("CARGO_MANIFEST_DIR"), "/tables/gb-bi.bin"));
+//! let mut control = ControlLoop::new(bytes);
+//! assert_eq!(control.table_error(), None);
+//!
+//! // One state a tick: f in uHz from 50 Hz; g, l, p in kW, which this table does not ask for.
+//! let at = |f_uhz| State([f_uhz, 0, 0, 0]);
+//! assert_eq!(control.step(at(0)).participation.ppm(), 0);
+//! // 5.7 GW/Hz from -0.042 Hz on are more than the fleet's 1.4 GW at -0.3 Hz: everything.
+//! assert_eq!(control.step(at(-300_000)).participation.ppm(), 1_000_000);
+//!
+//! // A damaged table is refused as a whole, and the droop of the firmware answers.
+//! let mut damaged = *bytes;
+//! damaged[40] ^= 1;
+//! let mut control = ControlLoop::new(&damaged);
+//! assert!(control.table_error().is_some());
+//! assert!(control.step(at(-300_000)).participation.ppm() > 0);
+//! ```
 #![no_std]
 #![forbid(unsafe_code)]
 

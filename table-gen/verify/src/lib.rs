@@ -30,6 +30,26 @@
 //! Whether I1 and I2 were left or reached is what the firmware measures at its ticks. Where
 //! commands act with a delay, it is what the firmware predicts there for the moment at which its
 //! command begins to act, and times end at that moment; bounds of f are always those of the real f.
+//!
+//! # From a spec to a proof
+//! ```
+//! use model::spec::Spec;
+//! use synth::game::unwatched;
+//! use synth::pipeline::{self, Encoding};
+//! use synth::synthesis;
+//!
+//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
+//! let spec = Spec::load("paper-bi", &[])?;
+//! let laws = synthesis::synthesise(&spec, &unwatched)?;
+//! assert_eq!(laws.c1.solution.winning, 1_042_103);
+//!
+//! // What goes into flash, and what is judged: not one bit of the laws but these bytes.
+//! let table = pipeline::emit(&laws, Encoding::default(), &unwatched)?;
+//! let verdict = verify::verify(&table.bytes, &spec, &|_| true)?;
+//! assert!(verdict.verified);
+//! # Ok(())
+//! # }
+//! ```
 
 mod cellset;
 mod claims;
