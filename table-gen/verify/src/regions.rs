@@ -65,6 +65,11 @@ impl Regions {
     /// The parts of a set by the band that a watching phase examines. On the other axes the
     /// representatives lie within the set's bounds.
     pub(super) fn by_band(&self, set: &Zonotope, phase: Phase) -> Vec<Part> {
+        // Bounds that cross: generators and limits have no state in common.
+        let empty = |axis| set.bounds(axis).low > set.bounds(axis).high;
+        if (0..STATES).any(empty) {
+            return Vec::new();
+        }
         let band = match phase {
             // No control ends below I1 alone: one edge, so that the sets that stay are not cut in
             // two.

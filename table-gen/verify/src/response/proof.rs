@@ -123,6 +123,19 @@ fn real_law(law: &ResponseLaw, tick_s: f64, tick_most_s: f64) -> Law {
     }
 }
 
+/// The case of a table and a spec, before it is cut into bands: for bounds under other assumptions than the header's.
+///
+/// # Errors
+/// A table that is no response.
+pub fn case_of(table: &TableView<'_>, spec: &Spec) -> Result<Case, VerifyError> {
+    let law = table.response().ok_or(VerifyError::Unsupported {
+        key: "table",
+        found: "laws by games".to_owned(),
+        remedy: "a response is",
+    })?;
+    Ok(case(law, table, spec))
+}
+
 /// What the table assumes and the spec's grid.
 fn case(law: &ResponseLaw, table: &TableView<'_>, spec: &Spec) -> Case {
     let header = table.header();
