@@ -1,0 +1,166 @@
+//! All nodes that are reached, and the chain that they make.
+
+use std::collections::HashMap;
+
+use rayon::prelude::*;
+
+use super::{ClosedLoop, ClosedLoopError, Ends, Expanded, Failures, Key, Loop, Settings};
+use crate::chain::{Branch, Chain, FAILED, SAFE};
+
+/// Nodes that are expanded between two looks at the clock.
+const TOGETHER: usize = 4096;
+
+impl Loop<'_> {
+    /// Expands all nodes that are reached, and makes the chain.
+    pub(super) fn explore(
+        &self,
+        start: Vec<Ends>,
+        steps: u32,
+        settings: &Settings,
+        go_on: &dyn Fn(usize, usize) -> bool,
+    ) -> Result<ClosedLoop, ClosedLoopError> {
+        let mut known = Known::default();
+        let mut initial = Vec::new();
+        for ends in &start {
+            initial.push(known.set(ends));
+        }
+        let mut failures = Failures::default();
+        // Branches of all decided states, and where those of a node begin.
+        let (mut rows, mut branches, mut first) = (vec![0usize; 3], Vec::new(), Vec::new());
+        let (mut expanded, mut depth, mut layer_end) = (0, 0, known.keys.len());
+        while expanded < known.keys.len() {
+            if expanded == layer_end {
+                depth += 1;
+                layer_end = known.keys.len();
+                // Nodes that are reached later than the last step matter to nobody; their value is
+                // 1 or less there.
+                if depth > steps {
+                    break;
+                }
+            }
+            let end = layer_end.min(expanded + TOGETHER);
+            let part: Vec<Expanded> = known.keys[expanded..end]
+                .par_iter()
+                .map(|key| self.expand(key))
+                .collect();
+            for node in part {
+                first.push(rows.len() - 1);
+                failures.containment += node.failures.containment;
+                failures.uncovered += node.failures.uncovered;
+                failures.late += node.failures.late;
+                failures.not_fitting += node.failures.not_fitting;
+                for decided in node.decided {
+                    for (probability, ends) in decided {
+                        let set = known.set(&ends);
+                        branches.push(Branch { probability, set });
+                    }
+                    rows.push(branches.len());
+                }
+            }
+            expanded = end;
+            if known.keys.len() > settings.nodes_max {
+                return Err(ClosedLoopError::TooLarge {
+                    nodes_max: settings.nodes_max,
+                    steps: depth,
+                });
+            }
+            if !go_on(expanded, known.keys.len()) {
+                return Err(ClosedLoopError::Interrupted);
+            }
+        }
+        let states = rows.len() - 1;
+        first.push(states);
+        let mut chain = Chain {
+            initial: Vec::new(),
+            rows,
+            branches,
+            set_rows: vec![0],
+            members: Vec::new(),
+        };
+        for set in &known.sets {
+            match set {
+                NodeSet::Failed => chain.members.push(FAILED),
+                NodeSet::Nodes(nodes) => {
+                    for node in nodes {
+                        let node = *node as usize;
+                        match (first.get(node), first.get(node + 1)) {
+                            (Some(from), Some(to)) if node < expanded => {
+                                chain.members.extend(*from as u32..*to as u32);
+                            }
+                            // Past the last step.
+                            _ => chain.members.push(SAFE),
+                        }
+                    }
+                }
+            }
+            // A set whose nodes decide nothing that counts is followed elsewhere, and safe here.
+            if chain.set_rows.last() == Some(&chain.members.len()) {
+                chain.members.push(SAFE);
+            }
+            chain.set_rows.push(chain.members.len());
+        }
+        for set in initial {
+            chain.initial.extend(chain.members(set).to_vec());
+        }
+        // Nothing is decided in the horizon: safe.
+        if chain.initial.is_empty() {
+            chain.initial.push(SAFE);
+        }
+        chain.initial.sort_unstable();
+        chain.initial.dedup();
+        Ok(ClosedLoop {
+            chain,
+            steps,
+            nodes: known.keys.len(),
+            failures,
+            reach_hz: self.cover.radius().iter().sum(),
+        })
+    }
+}
+
+/// Sets of nodes by their numbers.
+enum NodeSet {
+    Failed,
+    Nodes(Vec<u32>),
+}
+
+/// Nodes and sets that are known, each once.
+#[derive(Default)]
+struct Known {
+    keys: Vec<Key>,
+    numbers: HashMap<Key, u32>,
+    sets: Vec<NodeSet>,
+    positions: HashMap<Vec<u32>, u32>,
+    failed: Option<u32>,
+}
+
+impl Known {
+    fn node(&mut self, key: Key) -> u32 {
+        let next = self.keys.len() as u32;
+        *self.numbers.entry(key).or_insert_with(|| {
+            self.keys.push(key);
+            next
+        })
+    }
+
+    fn set(&mut self, ends: &Ends) -> u32 {
+        let next = self.sets.len() as u32;
+        match ends {
+            Ends::Failed => {
+                if self.failed.is_none() {
+                    self.sets.push(NodeSet::Failed);
+                }
+                *self.failed.get_or_insert(next)
+            }
+            Ends::In(keys) => {
+                let nodes: Vec<u32> = keys.iter().map(|key| self.node(*key)).collect();
+                if let Some(known) = self.positions.get(&nodes) {
+                    return *known;
+                }
+                self.positions.insert(nodes.clone(), next);
+                self.sets.push(NodeSet::Nodes(nodes));
+                next
+            }
+        }
+    }
+}

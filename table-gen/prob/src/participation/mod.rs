@@ -1,0 +1,283 @@
+//! The error of the delivered participation, drawn anew each period, cut into bins.
+//!
+//! Under a commanded participation u the fleet delivers u' in `[0, 1]`. A bin is an interval of u'
+//! and a lower bound of the probability that u' falls into it. Bins cover what counts; what they
+//! leave over counts as failure.
+
+mod cut;
+
+use std::str::FromStr;
+
+use model::interval::Interval;
+
+use crate::normal;
+use cut::{coins, relative};
+
+/// How the delivered participation is drawn.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Participation {
+    /// Exactly what was commanded.
+    Exact,
+    /// `u (1 + e)`, e uniform within ± this.
+    Uniform {
+        /// Largest relative error.
+        bound: f64,
+    },
+    /// `u (1 + e)`, e normal with this deviation, given that |e| is at most the bound.
+    Truncated {
+        /// Standard deviation, relative.
+        sigma: f64,
+        /// Largest relative error.
+        bound: f64,
+    },
+    /// `u (1 + e)`, e normal with this deviation. Errors past `tail` deviations count as failure.
+    Gaussian {
+        /// Standard deviation, relative.
+        sigma: f64,
+        /// Deviations that are followed.
+        tail: f64,
+    },
+    /// Each of so many chargers responds in full with probability u, on its own: the mean of as
+    /// many coins.
+    Bernoulli {
+        /// Chargers.
+        chargers: u32,
+    },
+}
+
+/// Deviations that are followed where nothing else is asked for.
+pub const TAIL: f64 = 5.0;
+/// Most chargers of a fleet of coins.
+const CHARGERS_MAX: u32 = 10_000_000;
+
+/// Why a distribution cannot be read.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error(
+    "participation = {found}: allowed are exact, uniform:BOUND, gaussian:SIGMA[,DEVIATIONS], truncated:SIGMA,BOUND \
+     (relative, above 0, at most 1; deviations 1 to 8) and bernoulli:CHARGERS (1 to {CHARGERS_MAX})"
+)]
+pub struct ParticipationError {
+    /// What was given.
+    pub found: String,
+}
+
+/// As it is read.
+impl std::fmt::Display for Participation {
+    fn fmt(&self, out: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::Exact => write!(out, "exact"),
+            Self::Uniform { bound } => write!(out, "uniform:{bound}"),
+            Self::Truncated { sigma, bound } => write!(out, "truncated:{sigma},{bound}"),
+            Self::Gaussian { sigma, tail } => write!(out, "gaussian:{sigma},{tail}"),
+            Self::Bernoulli { chargers } => write!(out, "bernoulli:{chargers}"),
+        }
+    }
+}
+
+impl FromStr for Participation {
+    type Err = ParticipationError;
+    fn from_str(text: &str) -> Result<Self, Self::Err> {
+        let wrong = || ParticipationError {
+            found: text.to_owned(),
+        };
+        let (kind, rest) = text.split_once(':').unwrap_or((text, ""));
+        let numbers: Vec<f64> = match rest {
+            "" => Vec::new(),
+            rest => rest
+                .split(',')
+                .map(|number| number.trim().parse().map_err(|_| wrong()))
+                .collect::<Result<_, _>>()?,
+        };
+        let share = |value: f64| value > 0.0 && value <= 1.0;
+        let found = match (kind, numbers.as_slice()) {
+            ("exact", []) => Self::Exact,
+            ("uniform", [bound]) if share(*bound) => Self::Uniform { bound: *bound },
+            ("gaussian", [sigma]) if share(*sigma) => Self::Gaussian {
+                sigma: *sigma,
+                tail: TAIL,
+            },
+            ("gaussian", [sigma, tail]) if share(*sigma) && (1.0..=8.0).contains(tail) => {
+                Self::Gaussian {
+                    sigma: *sigma,
+                    tail: *tail,
+                }
+            }
+            ("truncated", [sigma, bound]) if share(*sigma) && share(*bound) => Self::Truncated {
+                sigma: *sigma,
+                bound: *bound,
+            },
+            ("bernoulli", [n])
+                if *n >= 1.0 && *n <= f64::from(CHARGERS_MAX) && n.fract() == 0.0 =>
+            {
+                Self::Bernoulli {
+                    chargers: *n as u32,
+                }
+            }
+            _ => return Err(wrong()),
+        };
+        Ok(found)
+    }
+}
+
+/// A piece of the distribution.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Bin {
+    /// Lower bound of the probability.
+    pub probability: f64,
+    /// The delivered participation, within \[0, 1\].
+    pub delivered: Interval,
+}
+
+impl Participation {
+    /// Lower bound of the probability of a relative error within ± r of a command of 1 or less: for
+    /// proofs that hold for any error within r. Nothing for a fleet of coins, whose relative error
+    /// depends on the command.
+    pub fn within(&self, r: f64) -> Option<f64> {
+        let inside = |z: f64| (1.0 - normal::outside(z)).next_down().max(0.0);
+        match *self {
+            Self::Exact => Some(1.0),
+            Self::Uniform { bound } if r >= bound => Some(1.0),
+            Self::Uniform { bound } => Some((r / bound).next_down().max(0.0)),
+            Self::Truncated { bound, .. } if r >= bound => Some(1.0),
+            // Given |e| <= bound, an error within r is likelier still.
+            Self::Truncated { sigma, .. } | Self::Gaussian { sigma, .. } => {
+                Some(inside(down(r / sigma)))
+            }
+            Self::Bernoulli { .. } => None,
+        }
+    }
+
+    /// The bins under a command, each at most `width` of participation wide.
+    pub fn bins(&self, command: f64, width: f64) -> Vec<Bin> {
+        let all = |delivered| {
+            vec![Bin {
+                probability: 1.0,
+                delivered,
+            }]
+        };
+        // A relative error of nothing is nothing, and no coin falls on its face with probability 0.
+        if command == 0.0 || *self == Self::Exact {
+            return all(Interval::point(command));
+        }
+        match *self {
+            Self::Exact => all(Interval::point(command)),
+            Self::Bernoulli { .. } if command >= 1.0 => all(Interval::ONE),
+            Self::Bernoulli { chargers } => coins(chargers, command, width),
+            Self::Uniform { bound } => {
+                let share = |a: f64, b: f64| {
+                    let whole = Interval::point(2.0) * Interval::point(bound);
+                    let b = b.min(bound);
+                    ((Interval::point(b) - Interval::point(a)) / whole)
+                        .low
+                        .max(0.0)
+                };
+                relative(bound, command, width, &share)
+            }
+            Self::Truncated { sigma, bound } => {
+                // Given |e| <= bound, every probability is divided by one that is at most this.
+                let z = up(bound / sigma);
+                let whole = (normal::below(z) - normal::below(-z)).high.min(1.0);
+                let share = |a: f64, b: f64| {
+                    down(normal::mass(up(a / sigma), down(b.min(bound) / sigma)) / whole).max(0.0)
+                };
+                relative(bound, command, width, &share)
+            }
+            Self::Gaussian { sigma, tail } => {
+                let share = |a: f64, b: f64| normal::mass(up(a / sigma), down(b / sigma));
+                relative(tail * sigma, command, width, &share)
+            }
+        }
+    }
+}
+
+fn up(value: f64) -> f64 {
+    value.next_up()
+}
+
+fn down(value: f64) -> f64 {
+    value.next_down()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use statrs::distribution::{Binomial, DiscreteCDF};
+
+    #[test]
+    fn bins_touch_and_add_up() {
+        for (text, at_least) in [
+            ("uniform:0.1", 1.0 - 1e-12),
+            ("gaussian:0.05", 1.0 - 5.74e-7),
+            ("truncated:0.05,0.2", 1.0 - 1e-11),
+            ("bernoulli:25000", 1.0 - 1e-9),
+        ] {
+            let kind: Participation = text.parse().unwrap();
+            assert_eq!(kind.to_string().parse(), Ok(kind));
+            for command in [0.05, 0.5, 0.95, 1.0] {
+                let bins = kind.bins(command, 0.004);
+                let sum: f64 = bins.iter().map(|bin| bin.probability).sum();
+                assert!(
+                    sum <= 1.0 + 1e-12 && sum >= at_least,
+                    "{text} {command} {sum}"
+                );
+                for bin in &bins {
+                    let width = bin.delivered.high - bin.delivered.low;
+                    assert!(width <= 0.004 + 1e-12 && bin.delivered.high <= 1.0);
+                }
+                for pair in bins.windows(2) {
+                    let coin = matches!(kind, Participation::Bernoulli { .. });
+                    assert!(coin || pair[1].delivered.low <= pair[0].delivered.high);
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn a_full_fleet_takes_every_larger_error() {
+        // At u = 1 half of all errors deliver everything.
+        let bins = Participation::Gaussian {
+            sigma: 0.05,
+            tail: 5.0,
+        }
+        .bins(1.0, 0.01);
+        let last = bins.last().unwrap();
+        assert!(last.delivered.high == 1.0 && last.delivered.low > 1.0 - 1e-15);
+        assert!(last.probability > 0.5 - 1e-12 && last.probability <= 0.5);
+    }
+
+    #[test]
+    fn coins_agree_with_the_library_and_with_chernoff() {
+        let bins = coins(1000, 0.3, 0.01);
+        let library = Binomial::new(0.3, 1000).unwrap();
+        for bin in &bins {
+            let (a, b) = (
+                (bin.delivered.low * 1000.0).round() as u64,
+                (bin.delivered.high * 1000.0).round() as u64,
+            );
+            let known = library.cdf(b) - if a == 0 { 0.0 } else { library.cdf(a - 1) };
+            // The library's incomplete beta function is good to about 1e-10.
+            assert!((bin.probability - known).abs() < 1e-9, "{bin:?} {known}");
+        }
+        // 25,000 chargers, 5 % off at u = 0.3 in one of 120 decisions: 3.7e-4 by Chernoff
+        // and a union bound.
+        let bins = coins(25_000, 0.3, 1.0 / 25_000.0);
+        let off = |bin: &&Bin| (bin.delivered.mid() / 0.3 - 1.0).abs() < 0.05;
+        let inside: f64 = bins.iter().filter(off).map(|bin| bin.probability).sum();
+        assert!((1.0 - inside) * 120.0 < 3.7e-4);
+    }
+
+    #[test]
+    fn what_is_no_distribution_is_refused() {
+        for text in [
+            "",
+            "gauss:0.05",
+            "gaussian:",
+            "uniform:0",
+            "uniform:nan",
+            "gaussian:0.05,9",
+            "bernoulli:0.5",
+        ] {
+            assert!(text.parse::<Participation>().is_err(), "{text}");
+        }
+    }
+}
