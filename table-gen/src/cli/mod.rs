@@ -24,6 +24,7 @@ mod monte_carlo;
 mod ocpp;
 mod output;
 mod plot;
+mod prob;
 mod progress;
 #[cfg(feature = "mpi")]
 mod ranks;
@@ -82,6 +83,8 @@ enum Command {
     Replay(replay::ReplayArgs),
     /// Check the bytes of a table against a spec, independently of how they were made
     Verify(verify::VerifyArgs),
+    /// How likely a table keeps its promise: a rigorous lower bound
+    Prob(prob::ProbArgs),
     /// Search for a real trajectory that breaks a table
     Falsify(falsify::FalsifyArgs),
     /// A requirement in temporal logic: as games of a spec, or as a monitor of a recorded frequency
@@ -123,6 +126,7 @@ pub(crate) fn run() -> ExitCode {
         Command::Report(args) => report::run(&args),
         Command::Replay(args) => replay::run(&args),
         Command::Verify(args) => verify::run(&args),
+        Command::Prob(args) => prob::run(&args),
         Command::Falsify(args) => falsify::run(&args),
         Command::Formula(args) => formula::run(&args),
         Command::Monitor(args) => monitor::run(&args),

@@ -1,0 +1,292 @@
+//! `prob TABLE --spec SPEC`: a lower bound on the probability that a table keeps its promise.
+
+use std::path::{Path, PathBuf};
+
+use ::prob::analysis::{self, AnalysisError, Answer, Question};
+use ::prob::closed_loop::{ClosedLoopError, Settings};
+use ::prob::export;
+use ::prob::loss::Losses;
+use ::prob::participation::Participation;
+use ::prob::sampled::{RUNS_MAX, Runs, Sampled};
+use firmware::table::TableView;
+use serde::Serialize;
+use verify::VerifyError;
+
+use super::files::write_one;
+use super::{Failure, Overrides, output, progress};
+use model::spec::Spec;
+
+/// Time over which the promise is bounded where the spec has no horizon \[s\].
+const HORIZON_S: f64 = 120.0;
+
+/// Arguments of `prob`.
+#[derive(Debug, clap::Args)]
+pub(super) struct ProbArgs {
+    /// The table
+    #[arg(value_name = "TABLE")]
+    table: PathBuf,
+    /// Name of a shipped spec, or path of a TOML file
+    #[arg(long, value_name = "SPEC")]
+    spec: String,
+    #[command(flatten)]
+    overrides: Overrides,
+    #[command(flatten)]
+    output: super::OutputArgs,
+    /// Error of the delivered participation, drawn anew each period: exact, uniform:BOUND,
+    /// gaussian:SIGMA[,DEVIATIONS], truncated:SIGMA,BOUND or bernoulli:CHARGERS; default: as the
+    /// spec bounds it, with certainty
+    #[arg(long, value_name = "KIND")]
+    participation: Option<Participation>,
+    /// A response: time from one draw to the next [s]; default: the spec's period
+    #[arg(long, value_name = "S")]
+    draw_interval_s: Option<f64>,
+    /// A response: relative errors for which each band of losses is examined besides the spec's
+    #[arg(long, value_name = "E,E,...", value_delimiter = ',')]
+    errors: Vec<f64>,
+    /// Sizes of the loss: a CSV of loss_gw,weight (weights in events a year), or gb-synthetic
+    #[arg(long, value_name = "FILE")]
+    loss: Option<String>,
+    /// Normal noise of each reading of f, beside the meter's own error: standard deviation [Hz]
+    #[arg(long, value_name = "HZ")]
+    noise_hz: Option<f64>,
+    /// Time over which the promise is bounded; default: the spec's horizon, or 120 [s]
+    #[arg(long, value_name = "S")]
+    horizon_s: Option<f64>,
+    /// Width of a bin of the fleet's power [GW]
+    #[arg(long, value_name = "GW", default_value_t = 0.005)]
+    bin_gw: f64,
+    /// Most nodes of a chain
+    #[arg(long, value_name = "N", default_value_t = 2_000_000)]
+    nodes_max: usize,
+    /// Write the chain in Storm's format
+    #[arg(long, value_name = "FILE")]
+    drn: Option<PathBuf>,
+    /// Write the chain as PRISM's explicit files BASE.tra and BASE.lab
+    #[arg(long, value_name = "BASE")]
+    prism: Option<PathBuf>,
+    /// Runs of the same process beside the bound (laws by games)
+    #[arg(long, value_name = "N")]
+    runs: Option<u32>,
+    /// Seed of the first run
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    seed: u64,
+}
+
+#[derive(Debug, Serialize)]
+struct ProbReport<'r> {
+    spec: &'r str,
+    #[serde(flatten)]
+    answer: &'r Answer,
+    simulated: Option<Runs>,
+}
+
+/// Runs the command.
+pub(super) fn run(args: &ProbArgs) -> Result<(), Failure> {
+    let spec = args.overrides.load(&args.spec)?;
+    let question = question(args, &spec)?;
+    progress::catch_interrupts();
+    let bytes = std::fs::read(&args.table)
+        .map_err(|error| Failure::BadInput(format!("{}: {error}", args.table.display())))?;
+    let table = TableView::parse(&bytes)
+        .map_err(|error| Failure::BadInput(format!("the firmware rejects the table: {error:?}")))?;
+    let bar = progress::share("prob");
+    let answer = analysis::answer(&table, &spec, &question, &|done| bar(done)).map_err(failure)?;
+    exported(args, &spec, &answer)?;
+    let simulated = simulated(args, &spec, &table, &question)?;
+    if args.output.json {
+        return output::json(&ProbReport {
+            spec: &spec.name,
+            answer: &answer,
+            simulated,
+        });
+    }
+    print(&spec, &answer, simulated.as_ref());
+    Ok(())
+}
+
+/// The question of the options.
+fn question(args: &ProbArgs, spec: &Spec) -> Result<Question, Failure> {
+    let within = |name: &str, value: f64, [low, high]: [f64; 2]| {
+        if value > low && value <= high {
+            return Ok(value);
+        }
+        Err(Failure::BadInput(format!(
+            "{name} = {value}: above {low} and at most {high} is allowed"
+        )))
+    };
+    let horizon_s = args
+        .horizon_s
+        .or(spec.requirements.horizon_s)
+        .unwrap_or(HORIZON_S);
+    let interval = args.draw_interval_s.unwrap_or(spec.sampling.period_s);
+    for error in &args.errors {
+        within("--errors", *error, [0.0, 1.0])?;
+    }
+    let noise_hz = match args.noise_hz {
+        Some(sigma) => Some(within("--noise-hz", sigma, [0.0, 1.0])?),
+        None => None,
+    };
+    let losses = args
+        .loss
+        .as_deref()
+        .map(Losses::load)
+        .transpose()
+        .map_err(Failure::bad)?;
+    Ok(Question {
+        participation: args.participation,
+        draw_interval_s: within("--draw-interval-s", interval, [0.0, 3600.0])?,
+        losses,
+        noise_hz,
+        errors: args.errors.clone(),
+        settings: Settings {
+            bin_gw: within("--bin-gw", args.bin_gw, [0.0, 1.0])?,
+            nodes_max: args.nodes_max,
+            horizon_s: within("--horizon-s", horizon_s, [0.0, 3600.0])?,
+        },
+    })
+}
+
+fn failure(error: AnalysisError) -> Failure {
+    match &error {
+        AnalysisError::Chain(ClosedLoopError::TooLarge { .. } | ClosedLoopError::Interrupted)
+        | AnalysisError::Verify(VerifyError::Interrupted)
+        | AnalysisError::Table(_) => Failure::No(error.to_string()),
+        _ => Failure::bad(error),
+    }
+}
+
+/// Writes the chain where it is asked for.
+fn exported(args: &ProbArgs, spec: &Spec, answer: &Answer) -> Result<(), Failure> {
+    if args.drn.is_none() && args.prism.is_none() {
+        return Ok(());
+    }
+    let Some(chain) = &answer.chain else {
+        return Err(Failure::BadInput(
+            "--drn, --prism: a response has no chain; tables of laws by games do".to_owned(),
+        ));
+    };
+    let fail = |error: std::io::Error| Failure::bad(error);
+    if let Some(path) = &args.drn {
+        let note = format!(
+            "{}: 1 - Pmax=? [F<={} \"failed\"] is the lower bound over {} s",
+            spec.name,
+            export::steps_there(answer.steps),
+            answer.horizon_s
+        );
+        let mut text = Vec::new();
+        export::drn(chain, &note, &mut text).map_err(fail)?;
+        write_one(path, &text)?;
+    }
+    if let Some(base) = &args.prism {
+        let (mut tra, mut lab) = (Vec::new(), Vec::new());
+        export::prism(chain, &mut tra, &mut lab).map_err(fail)?;
+        let with = |ending: &str| -> PathBuf {
+            let mut name = base.clone().into_os_string();
+            name.push(ending);
+            name.into()
+        };
+        for (path, text) in [(with(".tra"), tra), (with(".lab"), lab)] {
+            write_one(Path::new(&path), &text)?;
+        }
+    }
+    Ok(())
+}
+
+/// Runs of the same process.
+fn simulated(
+    args: &ProbArgs,
+    spec: &Spec,
+    table: &TableView<'_>,
+    question: &Question,
+) -> Result<Option<Runs>, Failure> {
+    let Some(runs) = args.runs else {
+        return Ok(None);
+    };
+    if !(1..=RUNS_MAX).contains(&runs) {
+        return Err(Failure::BadInput(format!(
+            "--runs = {runs}: 1 to {RUNS_MAX} is allowed"
+        )));
+    }
+    if table.header().always_on {
+        return Err(Failure::BadInput(
+            "--runs: for a response use `simulate SPEC --runs N` or `fleet`".to_owned(),
+        ));
+    }
+    let kind = question.participation.unwrap_or(Participation::Exact);
+    let sampled = Sampled::new(table, spec, kind, question.settings.horizon_s);
+    let found = sampled.many(runs, args.seed, &|| !progress::interrupted());
+    found
+        .map(Some)
+        .ok_or_else(|| Failure::No("interrupted".to_owned()))
+}
+
+/// The answer for people.
+fn print(spec: &Spec, answer: &Answer, simulated: Option<&Runs>) {
+    output::line(format_args!(
+        "{}: P(psi over {} s) >= {:.9}   ({:.2e} may be lost)",
+        spec.name,
+        answer.horizon_s,
+        answer.lower_bound,
+        1.0 - answer.lower_bound
+    ));
+    let mut table = output::table(&["layer", "at least", "how"]);
+    let layers = &answer.layers;
+    let rows = [
+        ("size of the loss", Some(&layers.loss)),
+        ("participation", layers.participation.as_ref()),
+        ("noise", layers.noise.as_ref()),
+    ];
+    for (name, layer) in rows {
+        if let Some(layer) = layer {
+            table.add_row(vec![
+                name.to_owned(),
+                format!("{:.9}", layer.lower_bound),
+                layer.how.clone(),
+            ]);
+        }
+    }
+    output::line(table);
+    if answer.states > 0 {
+        output::line(format_args!(
+            "chain: {} states, {} transitions, {} steps; sets reach {:.1} mHz in f",
+            output::grouped(answer.states),
+            output::grouped(answer.transitions),
+            answer.steps,
+            1e3 * answer.reach_hz.unwrap_or(0.0)
+        ));
+    }
+    output::line(format_args!("most is lost by: {}", answer.dominates));
+    if !answer.rates.is_empty() {
+        let mut table = output::table(&[
+            "leaves, a year",
+            "no fleet, at least",
+            "at most",
+            "fleet, at most",
+        ]);
+        for rate in &answer.rates {
+            table.add_row(vec![
+                format!("{:.1} Hz", 50.0 + rate.limit_hz),
+                format!("{:.3}", rate.alone_at_least),
+                format!("{:.3}", rate.alone_at_most),
+                format!("{:.3}", rate.fleet_at_most),
+            ]);
+        }
+        output::line(table);
+    }
+    if let Some(runs) = simulated {
+        output::line(format_args!(
+            "simulated: {} of {} runs keep it; at 95 % between {:.6} and {:.6}, at 1 - 1e-6 between {:.6} and {:.6}; lowest f {:.4} Hz, seed {}",
+            runs.kept,
+            runs.runs,
+            runs.interval_95[0],
+            runs.interval_95[1],
+            runs.interval_1e6[0],
+            runs.interval_1e6[1],
+            runs.lowest_hz,
+            runs.worst_seed
+        ));
+    }
+    for assumption in &answer.assumptions {
+        output::line(format_args!("assumed: {assumption}"));
+    }
+}
