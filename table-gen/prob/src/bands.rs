@@ -53,7 +53,8 @@ pub fn of_response(
         case.assumed.loss = Interval::hull(band.low_gw, band.high_gw);
         case.last = case.assumed.loss;
         case.assumed.participation = *error;
-        let summary = examine_all(&case, LOSS_BAND_GW, &good, &|_| go_on()).ok_or(VerifyError::Interrupted)?;
+        let summary = examine_all(&case, LOSS_BAND_GW, &good, &|_| go_on())
+            .ok_or(VerifyError::Interrupted)?;
         let found: Option<Vec<Found>> = summary.found.into_iter().map(|(_, found)| found).collect();
         let lowest = |found: &Vec<Found>| {
             found

@@ -197,8 +197,7 @@ mod tests {
         }
         let flow = Flow::over(&a, &b, 1.5);
         let map = modes.map(&flow.phi);
-        // the plant's poles are -2.021, -0.433, -0.077 ± 0.226i. Three digits are given, so 1.5 s of them to
-        // 1e-3.
+        // The poles are -2.021, -0.433 and -0.077 ± 0.226i to three digits: 1.5 s of them to 1e-3.
         let mut norms: Vec<f64> = modes
             .blocks
             .iter()

@@ -1,7 +1,8 @@
 //! The value of a chain over a horizon: a lower bound of the probability not to fail.
 //!
 //! ```text
-//! V_0(q) = 1, but 0 for FAILED          V_{t+1}(q) = sum over k of p_k min over q' in Post(q, k) of V_t(q')
+//! V_0(q) = 1, but 0 for FAILED
+//! V_{t+1}(q) = sum over k of p_k min over q' in Post(q, k) of V_t(q')
 //! ```
 //!
 //! # Rounding

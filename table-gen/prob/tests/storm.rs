@@ -6,7 +6,7 @@
 //!
 //! ```text
 //! python3 -m venv ENV && ENV/bin/pip install stormpy
-//! HOLDFAST_PYTHON=ENV/bin/python cargo test --release -p prob --test storm -- --ignored --nocapture
+//! HOLDFAST_PYTHON=ENV/bin/python cargo test --release -p prob --test storm -- --ignored
 //! ```
 //!
 //! | instance | what |
