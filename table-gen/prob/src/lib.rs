@@ -6,7 +6,7 @@
 //! | layer | what is drawn | module |
 //! |---|---|---|
 //! | 1 | the size of the loss, once an event | `loss`, `bands` |
-//! | 2 | the error of what is delivered, anew each period | `participation`, `closed_loop`, `union` |
+//! | 2 | the error of the delivery, each period | `participation`, `closed_loop`, `union` |
 //! | 3 | the noise of the measurement | `union` |
 //!
 //! The second layer rests on a finite Markov chain whose branches lead to *sets* of states: what
