@@ -7,6 +7,7 @@
 //! | [`logic`] | a temporal formula | requirements |
 //! | [`plant`] | parameters | the equations, once, for plain numbers and intervals |
 //! | [`propagator`] | the equations | the exact step in plain numbers |
+//! | [`governor`], [`stepper`] | governors with limits | the same, not linear |
 //! | [`interval`], [`flow`] | the equations | enclosures of the flow over a time |
 //! | [`table_fields`] | a spec | plant, droop, hypotheses and response in a table's whole numbers |
 //! | [`grid_shape`] | a grid of cells | cell numbers |
@@ -17,6 +18,7 @@
 
 pub mod budget;
 pub mod flow;
+pub mod governor;
 pub mod grid_shape;
 pub mod hex;
 pub mod interval;
@@ -24,5 +26,6 @@ pub mod logic;
 pub mod plant;
 pub mod propagator;
 pub mod spec;
+pub mod stepper;
 pub mod table_fields;
 pub mod verdict;

@@ -167,7 +167,7 @@ pub(super) fn run(args: &SimulateArgs) -> Result<(), Failure> {
     };
     let disturbances = match &file {
         Some(file) => file.disturbances(&spec).map_err(Failure::bad)?,
-        None => Disturbances::step(scenario.loss_gw),
+        None => Disturbances::of(&spec, scenario.loss_gw),
     };
     let under = |respond| baseline::simulate_under(&spec, &disturbances, &scenario, respond);
     let (controller, run) = match args.controller {

@@ -1,17 +1,18 @@
 //! The grid in time under one controller.
 //!
-//! The plant takes exact steps of a part of a tick, over each of which the fleet's power is
-//! constant. The chargers watch a quiet grid before the event. The limit responds between two
-//! steps, at the moment itself.
+//! The plant takes steps of a part of a tick, exact ones where it is linear, over each of which the
+//! fleet's power is constant. The chargers watch a quiet grid before the event. The limit responds
+//! between two steps, at the moment itself.
 
 use super::chargers::{Chargers, PARTS};
 use super::outcome::Outcome;
 use crate::simulation::NOMINAL_HZ;
 use crate::simulation::closed_loop::measured;
 use crate::simulation::monitor::{Knot, Monitor};
+use model::governor::Governor;
 use model::plant::{Plant, STATES};
-use model::propagator::Propagator;
 use model::spec::Spec;
+use model::stepper::Stepper;
 
 /// Time for which the chargers watch the quiet grid before the event \[s\]; longer than any window
 /// of a law.
@@ -25,9 +26,10 @@ const HALVINGS: u32 = 30;
 #[derive(Debug, Clone)]
 pub struct Course {
     plant: Plant,
+    governor: Governor,
     part_s: f64,
     parts: usize,
-    step: Propagator,
+    step: Stepper,
     loss_gw: f64,
     x: [f64; STATES],
     time_s: f64,
@@ -44,9 +46,10 @@ impl Course {
         let initial = &spec.uncertainty.initial;
         Self {
             plant: *plant,
+            governor: Governor::of(spec),
             part_s,
             parts: (duration_s / part_s).round().max(1.0) as usize,
-            step: Propagator::new(plant, part_s),
+            step: Stepper::new(plant, Governor::of(spec), part_s),
             loss_gw,
             x: std::array::from_fn(|d| 0.5 * (initial.lower[d] + initial.upper[d])),
             time_s: 0.0,
@@ -87,10 +90,10 @@ impl Course {
             if given == 0.0 && self.step.step(&self.x, -self.loss_gw)[0] < trigger_hz {
                 given = 1.0;
                 let before_s = self.until(trigger_hz);
-                let step = Propagator::new(&self.plant, before_s);
+                let step = Stepper::new(&self.plant, self.governor, before_s);
                 self.advance(&step, before_s, 0.0);
                 let after_s = (part + 1) as f64 * self.part_s - self.time_s;
-                let step = Propagator::new(&self.plant, after_s);
+                let step = Stepper::new(&self.plant, self.governor, after_s);
                 self.advance(&step, after_s, given);
                 continue;
             }
@@ -105,7 +108,7 @@ impl Course {
         let (mut before, mut after) = (0.0, self.part_s);
         for _ in 0..HALVINGS {
             let middle = 0.5 * (before + after);
-            let step = Propagator::new(&self.plant, middle);
+            let step = Stepper::new(&self.plant, self.governor, middle);
             if step.step(&self.x, -self.loss_gw)[0] < trigger_hz {
                 after = middle;
             } else {
@@ -122,7 +125,7 @@ impl Course {
         self.time_s = (part + 1) as f64 * self.part_s;
     }
 
-    fn advance(&mut self, step: &Propagator, length_s: f64, given: f64) {
+    fn advance(&mut self, step: &Stepper, length_s: f64, given: f64) {
         let power = self.plant.fleet * given;
         let net = power - self.loss_gw;
         let plant = self.plant;

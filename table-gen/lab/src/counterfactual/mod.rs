@@ -5,7 +5,9 @@
 //! plant runs once more with it, now with the firmware in the loop, which sees the frequency alone
 //! ([`rerun`]). The answer inherits the plant, so it is given for two: the spec's, whose governors
 //! answer without limit, and one whose governors stop at the response that was held on the day.
-//! [`LIMITS`] says what neither knows.
+//! Where the spec's own governors are limited, as `identify` writes them, they take the place of
+//! the second, and the first is the same plant without their limits. [`LIMITS`] says what neither
+//! knows.
 
 pub mod rerun;
 pub mod smoother;
@@ -43,7 +45,7 @@ const FLEET_MAX_GW: f64 = 5.0;
 /// What the answer does not know.
 pub const LIMITS: [&str; 6] = [
     "The missing power is what the plant needs to explain the record: it holds every response that the plant does not model, and every error of the plant's parameters.",
-    "The spec's governors answer in proportion and without limit: they explain a fall to 48.8 Hz by far more missing power than was lost, and take back what the chargers give. The limited governors stop at the response stated; with them the inferred loss can be compared with the reported one.",
+    "Governors without limits answer in proportion: they explain a fall to 48.8 Hz by far more missing power than was lost, and take back what the chargers give. Limited governors stop at the response stated or identified; with them the inferred loss can be compared with the reported one.",
     "The record has one sample a second: a loss within a second is smeared over it, and the first second's slope is uncertain.",
     "Demand that relays disconnected at 48.8 Hz is in the record as power that came back. Where the chargers keep the frequency higher this would not have happened: one variant takes it out, by the amount stated, from the sample at which the record passes 48.8 Hz.",
     "Embedded generation that tripped because the frequency fell so low is in the record as missing power; with the chargers some of it would have stayed. This makes the answer pessimistic by an amount that is not known here.",
@@ -209,10 +211,16 @@ pub fn answer(
         output_gw: [f64::NEG_INFINITY, question.governor_max_gw],
         ..Governor::LINEAR
     };
-    let plants = [
-        ("spec's governors", Governor::LINEAR),
-        ("limited governors", limited),
-    ]
+    let own = Governor::of(spec);
+    // The plant that counts comes last; the other is there to compare with.
+    let plants = if own.is_linear() {
+        [("spec's governors", own), ("limited governors", limited)]
+    } else {
+        [
+            ("linear governors", Governor::LINEAR),
+            ("spec's governors", own),
+        ]
+    }
     .into_iter()
     .map(|(name, governor)| {
         let rerun = Rerun {

@@ -16,9 +16,10 @@
 //! participation goes the same way. So each trajectory is one of a real fleet.
 
 use firmware::table::TableView;
+use model::governor::Governor;
 use model::plant::{Plant, STATES};
-use model::propagator::Propagator;
 use model::spec::{LossProfile, Spec};
+use model::stepper::Stepper;
 use model::verdict::{ClaimName, RealPath};
 use rayon::prelude::*;
 
@@ -284,7 +285,7 @@ impl<'a> Fleets<'a> {
     fn run(&self, draw: &Draw, keep: bool) -> Outcome {
         let uncertainty = &self.spec.uncertainty;
         let part_s = self.tick_s / PARTS as f64;
-        let step = Propagator::new(&draw.plant, part_s);
+        let step = Stepper::new(&draw.plant, Governor::of(self.spec), part_s);
         let bound = uncertainty.measurement;
         let (mut x, rest) = (draw.initial, draw.initial);
         let mut crowd = Crowd::draw(self.table, draw.members, self.times, bound, rest, draw.seed);

@@ -67,7 +67,8 @@ pub fn falsify(
     Ok(search.run(steps, seed))
 }
 
-/// Whether a spec says more of the fleet than one participation.
+/// Whether a spec says more of the fleet than one participation, or more of the plant than its
+/// linear equations.
 fn knows_a_fleet(spec: &Spec) -> bool {
     let uncertainty = &spec.uncertainty;
     uncertainty.own_clocks
@@ -75,6 +76,7 @@ fn knows_a_fleet(spec: &Spec) -> bool {
         || uncertainty.inertia_gw_s_per_hz.is_some()
         || uncertainty.governor_gain_gw_per_hz.is_some()
         || uncertainty.damping_gw_per_hz.is_some()
+        || !spec.plant.governor.is_absent()
 }
 
 struct Search<'a> {

@@ -36,9 +36,10 @@ use config::PARTS;
 use hull::{HullConfig, OutsideHull};
 use instance::{Instance, Tally};
 use measure::{Finish, FleetMeasures, Meters};
+use model::governor::Governor;
 use model::plant::Plant;
-use model::propagator::Propagator;
 use model::spec::Spec;
+use model::stepper::Stepper;
 
 /// Time for which the chargers watch the quiet grid before the event \[s\]: the observer's first
 /// guess, wrong by at most five times the meter's error, has decayed by exp(-10 s / T_2) at least.
@@ -92,7 +93,7 @@ pub fn run(
     let plant = Plant::new(spec);
     let tick_s = f64::from(table.header().tick_ms) / 1000.0;
     let part_s = tick_s / PARTS as f64;
-    let step = Propagator::new(&plant, part_s);
+    let step = Stepper::new(&plant, Governor::of(spec), part_s);
     let mut x = scenario.initial;
     let rest_uhz = measured(&x).frequency_uhz();
     let mut chargers = Chargers::new(spec, table, config, rest_uhz);

@@ -29,7 +29,7 @@ const STEPS_PER_SAMPLE: usize = 10;
 
 /// Simulates the plant with the baseline, or without any response (`respond` false).
 pub fn simulate(spec: &Spec, scenario: &Scenario, respond: bool) -> Run {
-    let disturbances = Disturbances::step(scenario.loss_gw);
+    let disturbances = Disturbances::of(spec, scenario.loss_gw);
     simulate_under(spec, &disturbances, scenario, respond)
 }
 

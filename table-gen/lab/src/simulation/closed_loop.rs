@@ -11,12 +11,16 @@ use firmware::phase::Phase;
 use firmware::table::TableView;
 use firmware::units::{MICRO, State};
 
+use super::beyond::Disturbances;
+use super::beyond::plant::BeyondPlant;
+use super::beyond::system::BeyondSystem;
 use super::chance::Chance;
 use super::monitor::{Monitor, Summary};
 use super::power_system::{LinearSystem, Part, PartLengths, PowerSystem};
 use super::recorder::{History, Recorder};
 use super::scenario::Scenario;
 use super::trajectory::{Run, Sample};
+use model::governor::Governor;
 use model::plant::{Plant, STATES};
 use model::propagator::Propagator;
 use model::spec::Spec;
@@ -52,6 +56,7 @@ pub fn measured(x: &[f64; STATES]) -> State {
 #[derive(Debug, Clone)]
 pub struct ClosedLoop<'t> {
     plant: Plant,
+    governor: Governor,
     tick_s: f64,
     tick_step: Propagator,
     monitor: Monitor,
@@ -85,6 +90,7 @@ impl<'t> ClosedLoop<'t> {
         };
         Ok(Self {
             plant,
+            governor: Governor::of(spec),
             tick_s,
             tick_step: Propagator::new(&plant, tick_s),
             monitor: Monitor::new(spec),
@@ -104,10 +110,19 @@ impl<'t> ClosedLoop<'t> {
         (whole as usize, parts)
     }
 
-    /// One run on the spec's linear plant.
+    /// One run on the spec's plant.
     pub fn run(&mut self, scenario: &Scenario, recorder: &mut impl Recorder) -> Summary {
         let (_, parts) = self.parts(scenario);
         let (loss, initial) = (scenario.loss_gw, scenario.initial);
+        if !self.governor.is_linear() {
+            let disturbances = Disturbances {
+                governor: self.governor,
+                ..Disturbances::step(loss)
+            };
+            let plant = BeyondPlant::new(self.plant, &disturbances, 0.0, 0);
+            let mut grid = BeyondSystem::new(plant, parts, initial);
+            return self.run_on(&mut grid, scenario, recorder);
+        }
         let mut grid = LinearSystem::new(self.plant, &self.tick_step, parts, loss, initial);
         self.run_on(&mut grid, scenario, recorder)
     }

@@ -13,7 +13,7 @@
 //! | flag | `true` or `false` |
 //! | name, choice | the characters themselves (a name cannot contain a line break) |
 //! | formula | as it is printed, whatever its spaces and words; without one no such line |
-//! | absent | `none` |
+//! | absent | `none`; in `[plant.governor]` no such line |
 //!
 //! Nothing in it depends on the platform, on the order of keys in the file or on how a number was
 //! written there. A new key changes every hash: a table must then be built and verified again,
@@ -28,6 +28,8 @@ use super::keys::{FORMULA, KEYS, KeyValue};
 
 /// Section that no table depends on.
 const LABORATORY: &str = "charger";
+/// Section of which a key that is absent gives no line: it came after the first tables.
+const GOVERNOR: &str = "plant.governor";
 const HEADING: &str = "holdfast-spec-1\n";
 
 impl Spec {
@@ -46,7 +48,8 @@ impl Spec {
             if key.path == FORMULA && value == KeyValue::Absent {
                 continue;
             }
-            if key.section() == LABORATORY {
+            let absent = value == KeyValue::Absent;
+            if key.section() == LABORATORY || (absent && key.section() == GOVERNOR) {
                 continue;
             }
             text.push_str(key.path);
@@ -115,9 +118,12 @@ mod tests {
         assert!(text.contains("\nuncertainty.loss_gw=4000000000000000,4000000000000000\n"));
         assert!(text.contains("\nrequirements.containment_hz=none\n"));
         assert!(text.ends_with("\nmethod.between_samples=false\n"));
-        // The heading, and every key but the formula, which is absent, and the laboratory's.
-        let laboratory = KEYS.iter().filter(|key| key.section() == LABORATORY);
-        assert_eq!(text.lines().count(), KEYS.len() - laboratory.count());
+        // The heading, and every key but the formula and the governors' limits, which are absent,
+        // and the laboratory's.
+        let left_out =
+            |key: &&super::super::keys::Key| [LABORATORY, GOVERNOR].contains(&key.section());
+        let left_out = KEYS.iter().filter(left_out);
+        assert_eq!(text.lines().count(), KEYS.len() - left_out.count());
     }
 
     #[test]

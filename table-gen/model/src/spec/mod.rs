@@ -29,6 +29,7 @@ mod delay_range;
 mod error;
 mod formula;
 mod geometry;
+mod governor;
 mod grid;
 mod hash;
 mod keys;
@@ -54,6 +55,7 @@ pub use claims::{Domain, InitialBox, LossProfile, RequirementsSpec, TableSpec, U
 pub use compile::{Compiled, NotSupported, compile};
 pub use delay_range::DelayRange;
 pub use error::SpecError;
+pub use governor::GovernorSpec;
 pub use grid::{Alignment, GridSpec};
 pub use keys::{KeyDoc, reference};
 pub use meter::{MeterKind, MeterSpec};

@@ -3,6 +3,8 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::GovernorSpec;
+
 /// Grid frequency dynamics:
 ///
 /// ```text
@@ -44,6 +46,9 @@ pub struct PlantSpec {
     ///
     /// Unit: GW s/Hz. Allowed: a number from 0.001 to 10000. Default: 4.
     pub inertia_gw_s_per_hz: f64,
+    /// What the governors cannot do; absent: the linear plant.
+    #[serde(skip_serializing_if = "GovernorSpec::is_absent")]
+    pub governor: GovernorSpec,
 }
 
 impl Default for PlantSpec {
@@ -56,6 +61,7 @@ impl Default for PlantSpec {
             lag_time_s: 12.0,
             damping_gw_per_hz: 1.0,
             inertia_gw_s_per_hz: 4.0,
+            governor: GovernorSpec::default(),
         }
     }
 }

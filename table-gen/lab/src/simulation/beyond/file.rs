@@ -7,7 +7,7 @@
 //! at_s = 0.0                           # s after the event, whole milliseconds
 //! power_gw = 1.2                       # GW; negative where power comes back
 //! inertia_gw_s_per_hz = 0.3            # goes with it; default 0
-//! [governor]                           # each key optional
+//! [governor]                           # each key optional; absent: the spec's
 //! deadband_hz = 0.015
 //! rate_gw_per_s = 0.2
 //! output_gw = [0.0, 1.0]
@@ -219,20 +219,22 @@ impl ScenarioFile {
         within("errors.delay_s", errors.delay_s, 0.0, 60.0, "s")
     }
 
+    /// The losses, in the order of time.
+    pub fn losses(&self) -> Vec<Loss> {
+        let loss = |entry: &LossEntry| Loss {
+            at_s: entry.at_s,
+            power_gw: entry.power_gw,
+            inertia_gw_s_per_hz: entry.inertia_gw_s_per_hz,
+        };
+        self.loss.iter().map(loss).collect()
+    }
+
     /// The disturbances on a spec's plant.
     ///
     /// # Errors
     /// Losses that leave too little inertia.
     pub fn disturbances(&self, spec: &Spec) -> Result<Disturbances, ScenarioFileError> {
-        let losses: Vec<Loss> = self
-            .loss
-            .iter()
-            .map(|entry| Loss {
-                at_s: entry.at_s,
-                power_gw: entry.power_gw,
-                inertia_gw_s_per_hz: entry.inertia_gw_s_per_hz,
-            })
-            .collect();
+        let losses = self.losses();
         let mut inertia = spec.plant.inertia_gw_s_per_hz;
         for loss in &losses {
             inertia -= loss.inertia_gw_s_per_hz;
@@ -243,13 +245,11 @@ impl ScenarioFile {
                 )));
             }
         }
+        let own = Governor::of(spec);
         let governor = Governor {
-            rate_gw_per_s: self.governor.rate_gw_per_s.unwrap_or(f64::INFINITY),
-            output_gw: self
-                .governor
-                .output_gw
-                .unwrap_or(Governor::LINEAR.output_gw),
-            deadband_hz: self.governor.deadband_hz.unwrap_or(0.0),
+            rate_gw_per_s: self.governor.rate_gw_per_s.unwrap_or(own.rate_gw_per_s),
+            output_gw: self.governor.output_gw.unwrap_or(own.output_gw),
+            deadband_hz: self.governor.deadband_hz.unwrap_or(own.deadband_hz),
         };
         let demand = DemandNoise {
             deviation_gw: self.demand.noise_gw.unwrap_or(0.0),

@@ -19,6 +19,8 @@ pub mod system;
 
 use model::spec::Spec;
 
+pub use model::governor::Governor;
+
 /// Lost infeed at one moment.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Loss {
@@ -28,26 +30,6 @@ pub struct Loss {
     pub power_gw: f64,
     /// Inertia that goes with it \[GW s/Hz\].
     pub inertia_gw_s_per_hz: f64,
-}
-
-/// Limits of the governors; [`Governor::LINEAR`] has none.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Governor {
-    /// Largest change of the governor's output \[GW/s\].
-    pub rate_gw_per_s: f64,
-    /// Least and greatest output \[GW\].
-    pub output_gw: [f64; 2],
-    /// Deviation to either side that the governors do not see \[Hz\].
-    pub deadband_hz: f64,
-}
-
-impl Governor {
-    /// The governor of the paper.
-    pub const LINEAR: Self = Self {
-        rate_gw_per_s: f64::INFINITY,
-        output_gw: [f64::NEG_INFINITY, f64::INFINITY],
-        deadband_hz: 0.0,
-    };
 }
 
 /// Noise of the demand: a stationary process of Ornstein and Uhlenbeck.
@@ -79,7 +61,15 @@ pub struct Disturbances {
 }
 
 impl Disturbances {
-    /// The event of the paper: one loss at time 0 on the spec's own plant.
+    /// One loss at time 0 on the spec's own plant.
+    pub fn of(spec: &Spec, loss_gw: f64) -> Self {
+        Self {
+            governor: Governor::of(spec),
+            ..Self::step(loss_gw)
+        }
+    }
+
+    /// The event of the paper: one loss at time 0 on a linear plant.
     pub fn step(loss_gw: f64) -> Self {
         let loss = Loss {
             at_s: 0.0,
@@ -116,20 +106,21 @@ impl Disturbances {
                 "{inertia:.3} GW s/Hz of inertia are lost with the infeed"
             ));
         }
-        let governor = &self.governor;
-        if governor.deadband_hz > 0.0 {
+        // What the spec's own governors cannot do is a matter of `verify`.
+        let (governor, own) = (&self.governor, Governor::of(spec));
+        if governor.deadband_hz != own.deadband_hz {
             out.push(format!(
                 "the governors have a dead band of {} Hz",
                 governor.deadband_hz
             ));
         }
-        if governor.rate_gw_per_s.is_finite() {
+        if governor.rate_gw_per_s != own.rate_gw_per_s {
             out.push(format!(
                 "the governors' output moves by at most {} GW/s",
                 governor.rate_gw_per_s
             ));
         }
-        if governor.output_gw.iter().any(|limit| limit.is_finite()) {
+        if governor.output_gw != own.output_gw {
             let [low, high] = governor.output_gw;
             out.push(format!(
                 "the governors' output stays within {low} to {high} GW"

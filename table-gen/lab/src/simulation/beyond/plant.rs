@@ -13,6 +13,8 @@ use super::noise::{HOLD_S, Noise};
 use super::{Disturbances, Governor, Loss};
 use model::plant::{Plant, STATES};
 
+pub use model::stepper::runge_kutta;
+
 /// A plant with its disturbances of one run.
 #[derive(Debug, Clone)]
 pub struct BeyondPlant {
@@ -82,16 +84,8 @@ impl BeyondPlant {
     /// x' for a drive and a power of the fleet \[GW\].
     pub fn derivative(&self, x: &[f64; STATES], drive: &Drive, fleet_gw: f64) -> [f64; STATES] {
         let [f, g, l, p] = *x;
-        let (plant, governor) = (&self.plant, &self.governor);
-        let seen = f - f.clamp(-governor.deadband_hz, governor.deadband_hz);
-        let rate = governor.rate_gw_per_s;
-        let wanted = (plant.governor_gain * seen - g) / plant.governor_time;
-        let [low, high] = governor.output_gw;
-        let dg = if (g >= high && wanted > 0.0) || (g <= low && wanted < 0.0) {
-            0.0
-        } else {
-            wanted.clamp(-rate, rate)
-        };
+        let plant = &self.plant;
+        let dg = self.governor.rate(plant, f, g);
         let net = p + fleet_gw - drive.missing_gw - plant.damping * f;
         [
             net / drive.twice_inertia,
@@ -103,21 +97,6 @@ impl BeyondPlant {
 
     /// The governor's output within its limits; a step may end past one by a rate times the step.
     pub fn limit(&self, x: &mut [f64; STATES]) {
-        let [low, high] = self.governor.output_gw;
-        x[1] = x[1].clamp(low, high);
+        self.governor.limit(x);
     }
-}
-
-/// One step of the classical Runge-Kutta method; `k1` is the slope at `y`.
-pub fn runge_kutta<const N: usize>(
-    derivative: &impl Fn(&[f64; N]) -> [f64; N],
-    y: &[f64; N],
-    k1: [f64; N],
-    h: f64,
-) -> [f64; N] {
-    let along = |k: &[f64; N], h: f64| std::array::from_fn(|i| y[i] + h * k[i]);
-    let k2 = derivative(&along(&k1, 0.5 * h));
-    let k3 = derivative(&along(&k2, 0.5 * h));
-    let k4 = derivative(&along(&k3, h));
-    std::array::from_fn(|i| y[i] + h / 6.0 * (k1[i] + 2.0 * k2[i] + 2.0 * k3[i] + k4[i]))
 }

@@ -69,6 +69,10 @@ fn the_key_table_and_the_structs_have_the_same_keys() {
         "uncertainty.inertia_gw_s_per_hz=[2, 4]",
         "uncertainty.governor_gain_gw_per_hz=[-5, -4]",
         "uncertainty.damping_gw_per_hz=[0.8, 1]",
+        "plant.governor.deadband_hz=0.015",
+        "plant.governor.rate_gw_per_s=0.2",
+        "plant.governor.lower_gw=-1",
+        "plant.governor.upper_gw=1",
     ];
     let spec = super::with(&bands).unwrap();
     let text = toml::to_string(&spec).unwrap();
@@ -84,6 +88,7 @@ fn the_field_docs_agree_with_the_key_table() {
     let source = [
         include_str!("../schema.rs"),
         include_str!("../plant.rs"),
+        include_str!("../governor.rs"),
         include_str!("../grid.rs"),
         include_str!("../sampling.rs"),
         include_str!("../claims.rs"),
