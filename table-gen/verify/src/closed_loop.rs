@@ -94,6 +94,29 @@ impl Model {
     }
 }
 
+/// The first key of `plant.governor` that is there.
+fn governor_key(spec: &Spec) -> Option<&'static str> {
+    let keys = &spec.plant.governor;
+    [
+        ("plant.governor.deadband_hz", keys.deadband_hz),
+        ("plant.governor.rate_gw_per_s", keys.rate_gw_per_s),
+        ("plant.governor.lower_gw", keys.lower_gw),
+        ("plant.governor.upper_gw", keys.upper_gw),
+    ]
+    .into_iter()
+    .find_map(|(key, value)| value.map(|_| key))
+}
+
+/// Why nothing is examined for laws by games, if the spec's governors are limited.
+pub(crate) fn not_linear(spec: &Spec) -> Option<String> {
+    governor_key(spec).map(|key| {
+        format!(
+            "not examined: {key} makes the plant non-linear, and laws by games are examined on \
+             linear plants only"
+        )
+    })
+}
+
 /// A number of the spec in micro-units. Decimal numbers that name whole micro-units become exactly
 /// those.
 pub(crate) fn micro(value: f64) -> Interval {
@@ -133,4 +156,23 @@ fn net_power(spec: &Spec, ppm: u32) -> Interval {
     let low = (commanded * (Interval::ONE - error)).low.max(0.0);
     let high = (commanded * (Interval::ONE + error)).high.min(fleet.high);
     Interval::hull(low, high) - loss
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_limit_of_the_governors_is_named_and_a_linear_plant_is_examined() {
+        let load = |set: &[String]| Spec::load("paper-bi", set).unwrap();
+        assert_eq!(not_linear(&load(&[])), None);
+        for key in ["deadband_hz", "rate_gw_per_s", "upper_gw"] {
+            let key = format!("plant.governor.{key}");
+            let reason = not_linear(&load(&[format!("{key}=0.5")])).unwrap();
+            assert!(
+                reason.starts_with(&format!("not examined: {key}")),
+                "{reason}"
+            );
+        }
+    }
 }

@@ -39,7 +39,7 @@ use model::interval::Interval;
 use model::plant::STATES;
 use model::spec::Spec;
 
-use super::closed_loop::{MICRO, Model, commands, micro};
+use super::closed_loop::{MICRO, Model, commands, micro, not_linear};
 use super::drive::Drive;
 use super::estimate_error::{CommandDelay, EstimateError, PeriodEffect, up};
 use super::held_input::HeldInput;
@@ -67,6 +67,9 @@ pub(crate) fn closed_loop(table: &TableView<'_>, spec: &Spec) -> Model {
         model.known.limit = Some(format!(
             "the table predicts over {predicted} ticks, the spec's commands act {late} late"
         ));
+    }
+    if let Some(reason) = not_linear(spec) {
+        model.known.limit = Some(reason);
     }
     model
 }

@@ -7,6 +7,7 @@
 //! of readings, delivery, the loss, and the state that the event finds.
 
 use firmware::response::{LevelOffset, Response, ResponseLaw};
+use model::governor::Governor;
 use model::interval::Interval;
 use model::plant::Plant;
 use rand::RngExt;
@@ -51,7 +52,7 @@ fn plant() -> Plant {
     }
 }
 
-fn case(loss: Interval) -> Case {
+fn case(loss: Interval, governor: Governor) -> Case {
     let known = plant();
     let share = |ppm: u32| f64::from(ppm) / 1e6;
     Case {
@@ -60,6 +61,7 @@ fn case(loss: Interval) -> Case {
             inertia: Interval::point(known.inertia),
             governor_gain: Interval::point(known.governor_gain),
             damping: Interval::point(known.damping),
+            governor,
         },
         law: Law {
             droop: share(LAW.droop_gain_ppm_per_hz),
@@ -119,7 +121,13 @@ struct Charger {
 
 /// Runs one fleet; the largest share of the way from the middle of the bounds to their edge that f
 /// took.
-fn run(seed: u64, malice: Malice, chargers: usize, loss: Interval, found: &Found) -> f64 {
+fn run(
+    seed: u64,
+    malice: Malice,
+    chargers: usize,
+    (loss, governor): (Interval, Governor),
+    found: &Found,
+) -> f64 {
     let mut rng = Pcg64::seed_from_u64(seed);
     let plant = plant();
     let steps_per_tick = (TICK_S / H).round() as usize;
@@ -131,6 +139,7 @@ fn run(seed: u64, malice: Malice, chargers: usize, loss: Interval, found: &Found
             r * (2.0 * rng.random::<f64>() - 1.0)
         }
     });
+    governor.limit(&mut x);
     let w = loss.low + (loss.high - loss.low) * rng.random::<f64>();
     let mut fleet: Vec<Charger> = (0..chargers)
         .map(|serial| Charger {
@@ -232,7 +241,7 @@ fn run(seed: u64, malice: Malice, chargers: usize, loss: Interval, found: &Found
             continue;
         }
         let net = FLEET_GW * sum / chargers as f64 - w;
-        let slope = |x: [f64; 4]| plant.derivative(x, net);
+        let slope = |x: [f64; 4]| governor.derivative(&plant, &x, net);
         let k1 = slope(x);
         let at = |k: [f64; 4], h: f64| std::array::from_fn(|axis| x[axis] + h * k[axis]);
         let k2 = slope(at(k1, H / 2.0));
@@ -241,12 +250,13 @@ fn run(seed: u64, malice: Malice, chargers: usize, loss: Interval, found: &Found
         x = std::array::from_fn(|axis| {
             x[axis] + H / 6.0 * (k1[axis] + 2.0 * k2[axis] + 2.0 * k3[axis] + k4[axis])
         });
+        governor.limit(&mut x);
         f.push(x[0]);
         let index = (((t + H) / found.step_s) as usize).min(found.tube.len() - 1);
         let tube = found.tube[index].join(found.tube[index.saturating_sub(1)]);
         assert!(
             tube.contains(x[0]),
-            "seed {seed} {malice:?} {chargers} chargers, {w} GW: f = {} at {t:.3} s, bounds {tube:?}",
+            "seed {seed} {malice:?} {chargers} chargers, {w} GW, {governor:?}: f = {} at {t:.3} s, bounds {tube:?}",
             x[0]
         );
         let middle = 0.5 * (tube.low + tube.high);
@@ -266,7 +276,8 @@ fn no_fleet_leaves_its_bounds() {
     let mut closest = 0.0f64;
     for (number, low) in [0.0, 0.3, 0.8, 1.3, 1.8, 2.16].into_iter().enumerate() {
         let loss = Interval::hull(low, low + 0.04);
-        let found = examine(&case(loss), RESOLUTION).expect("bounds");
+        let grid = (loss, Governor::LINEAR);
+        let found = examine(&case(loss, Governor::LINEAR), RESOLUTION).expect("bounds");
         for draw in 0..6 {
             let seed = (number * 100 + draw) as u64;
             for malice in [
@@ -279,12 +290,74 @@ fn no_fleet_leaves_its_bounds() {
                 Malice::TwoGroups,
             ] {
                 let chargers = [1, 2, 12][draw % 3];
-                closest = closest.max(run(seed, malice, chargers, loss, &found));
+                closest = closest.max(run(seed, malice, chargers, grid, &found));
             }
         }
-        closest = closest.max(run(9, Malice::Random, 300, loss, &found));
+        closest = closest.max(run(9, Malice::Random, 300, grid, &found));
     }
     // Bounds that nobody comes near would prove little: someone gets at least half way to the edge.
     assert!(closest > 0.5, "{closest}");
     println!("closest: {closest:.3} of the way to the edge of the bounds");
+}
+
+/// Bounds for a person.
+fn shown(found: &Found) -> String {
+    let end = found.for_ever.map_or("nothing for ever".to_owned(), |f| {
+        format!("in the end {:.4} to {:.4}", f.low, f.high)
+    });
+    format!("f in {:.4} to {:.4} Hz, {end}", found.f.low, found.f.high)
+}
+
+/// The same with governors that have a dead band, a limited rate and a limited output, each alone
+/// and all together.
+#[test]
+fn no_fleet_leaves_its_bounds_on_limited_governors() {
+    let dead = Governor {
+        deadband_hz: 0.015,
+        ..Governor::LINEAR
+    };
+    let slow = Governor {
+        rate_gw_per_s: 0.3,
+        ..Governor::LINEAR
+    };
+    let full = Governor {
+        output_gw: [-0.3, 1.2],
+        ..Governor::LINEAR
+    };
+    let all = Governor {
+        deadband_hz: 0.015,
+        rate_gw_per_s: 0.4,
+        output_gw: [-0.4, 1.4],
+    };
+    let losses: [(Governor, &[f64]); 4] = [
+        (dead, &[0.0, 0.8, 1.6, 2.16]),
+        (slow, &[0.0, 0.8, 1.2, 1.6]),
+        (full, &[0.0, 0.8, 1.2, 1.6, 2.0]),
+        (all, &[0.0, 0.8, 1.2]),
+    ];
+    for (number, (governor, losses)) in losses.into_iter().enumerate() {
+        let mut closest = 0.0f64;
+        for (loss_number, low) in losses.iter().enumerate() {
+            let loss = Interval::hull(*low, low + 0.04);
+            let found = examine(&case(loss, governor), RESOLUTION).expect("bounds");
+            println!("{governor:?}, {low} GW: {found}", found = shown(&found));
+            for draw in 0..4 {
+                let seed = (number * 1000 + loss_number * 100 + draw) as u64;
+                for malice in [
+                    Malice::Random,
+                    Malice::LowAndLate,
+                    Malice::HighAndEarly,
+                    Malice::Pump,
+                    Malice::Swing(3.0 + draw as f64),
+                    Malice::TwoGroups,
+                ] {
+                    let chargers = [1, 2, 12][draw % 3];
+                    let went = run(seed, malice, chargers, (loss, governor), &found);
+                    closest = closest.max(went);
+                }
+            }
+        }
+        assert!(closest > 0.5, "{governor:?}: {closest}");
+        println!("{governor:?}: closest {closest:.3}");
+    }
 }

@@ -25,6 +25,7 @@ use model::interval::Interval;
 use model::plant::STATES;
 
 use super::fleet_loop::{FleetLoop, LossProfile};
+use super::governor::Disturbance;
 use super::lines::{Line, TOUCHES};
 
 /// Sixteen half units in the last place, relative.
@@ -45,6 +46,8 @@ pub(super) struct Step {
     pub(super) slack: f64,
     /// Bound of |f'| in the step \[Hz/s\].
     pub(super) rate: f64,
+    /// What limits of the governors add to their input in the step \[GW\].
+    pub(super) governor: Option<Disturbance>,
 }
 
 /// The steps so far, and what bounds the state where a sweep ends early.
@@ -250,6 +253,34 @@ impl Past<'_> {
                 * (spread * unknown_f + dot(&magnitude, &number.spread_gain) * unknown_gain);
             bound -= unknown;
             size += unknown;
+            // What limits of the governors add: lines in the sample's f and g.
+            let mut fed_back = [0.0; STATES];
+            if let Some(lines) = &step.governor {
+                let mean = dot(&lambda, &number.drive_gain.map(|d| d.0));
+                let (start, end) = (
+                    dot(&lambda, &number.gain_start),
+                    dot(&lambda, &number.gain_end),
+                );
+                let curvature =
+                    dot(&magnitude, &number.gain_curvature) * number.step_s * number.step_s / 8.0;
+                let absolute =
+                    absolute_integral(start, end, curvature, number.step_s).max(mean.abs());
+                let unsure = dot(
+                    &magnitude,
+                    &number.drive_gain.map(|d| d.1 + EPS * d.0.abs()),
+                );
+                let (plus, minus) = (0.5 * (absolute + mean), 0.5 * (absolute - mean));
+                let (low, high) = (&lines.low, &lines.high);
+                let constant = plus * low.constant - minus * high.constant;
+                bound += constant;
+                fed_back[0] = plus * low.f - minus * high.f;
+                fed_back[1] = plus * low.g - minus * high.g;
+                let largest = |line: &super::governor::Affine| {
+                    line.constant.abs() + line.f.abs() * self.most[0] + line.g.abs() * self.most[1]
+                };
+                size += (plus * low.constant).abs() + (minus * high.constant).abs();
+                residual += (unsure + EPS * absolute) * (largest(low) + largest(high));
+            }
             let mut next = [0.0; STATES];
             for (row, factor) in number.transition.iter().zip(lambda) {
                 for (axis, (mid, radius)) in row.iter().enumerate() {
@@ -258,8 +289,11 @@ impl Past<'_> {
                 }
             }
             lambda = next;
+            lambda[0] += fed_back[0];
+            lambda[1] += fed_back[1];
             lambda[0] += waiting[i];
             residual += EPS * lambda[0].abs() * self.most[0];
+            residual += EPS * fed_back[1].abs() * self.most[1];
         }
         let assumed = &number.assumed;
         let box_ends = self.at_the_end(i, lambda, &waiting, &before);

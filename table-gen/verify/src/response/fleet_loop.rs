@@ -4,6 +4,7 @@
 //! the governor chain are the plant's; u is the participation that the fleet delivers.
 
 use model::flow::{self, Flow, Vector};
+use model::governor::Governor;
 use model::interval::Interval;
 use model::plant::{Plant, STATES};
 
@@ -54,6 +55,8 @@ pub struct PlantBand {
     pub governor_gain: Interval,
     /// D \[GW/Hz\].
     pub damping: Interval,
+    /// What the governors cannot do.
+    pub governor: Governor,
 }
 
 /// What the proof assumes of fleet, meters and cars.
@@ -112,6 +115,19 @@ pub struct FleetLoop {
     pub spread_f: [f64; STATES],
     /// The same for the direction in which an unknown governor gain acts.
     pub spread_gain: [f64; STATES],
+    /// The integral over a step of the direction in which the governors' input acts: middle and
+    /// radius.
+    pub drive_gain: [(f64, f64); STATES],
+    /// That direction, for the sign of its integrand at the start of a step.
+    pub gain_start: [f64; STATES],
+    /// The same at the end of a step.
+    pub gain_end: [f64; STATES],
+    /// Bound of its integrand's second derivative within a step.
+    pub gain_curvature: [f64; STATES],
+    /// What the governors cannot do.
+    pub governor: Governor,
+    /// K in the middle of its band \[GW/Hz\].
+    pub gain_mid: f64,
     /// Half width of 1/2H, relative to nothing \[Hz/s per GW\].
     pub inverse_inertia_radius: f64,
     /// Largest 1/2H.
@@ -174,6 +190,15 @@ impl FleetLoop {
             drive_curvature: magnitude(curvature),
             spread_f: magnitude(flow::apply(&within, &unit)),
             spread_gain: magnitude(flow::apply(&within, &gain)),
+            drive_gain: Flow::over(&a, &gain, step_s).gamma.map(split),
+            gain_start: gain.map(Interval::mid),
+            gain_end: flow::apply(&flow.phi, &gain).map(Interval::mid),
+            gain_curvature: magnitude(flow::apply(
+                &within,
+                &flow::apply(&flow::product(&a, &a), &gain),
+            )),
+            governor: plant.governor,
+            gain_mid: nominal.governor_gain,
             inverse_inertia_radius: (nominal_inverse.high - inverse.low)
                 .max(inverse.high - nominal_inverse.low)
                 .max(0.0)
@@ -206,7 +231,9 @@ impl FleetLoop {
         let [_, g0, l0, p0] = self.assumed.initial;
         let lead = self.known.lead_time / self.known.governor_time;
         let g = g0.max(self.gain_most * f_most);
-        let l = l0.max(lead.abs() * self.gain_most * f_most + (1.0 - lead).abs() * g);
+        // The governors' input lies between g and what is asked of them.
+        let asked = g.max(self.gain_most * f_most);
+        let l = l0.max(lead.abs() * asked + (1.0 - lead).abs() * g);
         let p = p0.max(l);
         [f_most, g, l, p].map(|bound| bound * (1.0 + 1e-12))
     }

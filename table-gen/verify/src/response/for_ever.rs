@@ -12,6 +12,7 @@ use model::interval::Interval;
 
 use super::adjoint::{Choice, Past, Step, choices};
 use super::fleet_loop::FleetLoop;
+use super::governor;
 use super::watched::Watched;
 use super::window::{F_MOST_HZ, Sample, Samples, Window, meet};
 
@@ -52,7 +53,14 @@ pub(super) fn from_rest(number: &FleetLoop, window: Window, memory: usize) -> Op
             high: most,
         }
     };
-    let [f, _, l, p] = number.assumed.initial;
+    let [f, g, l, p] = number.assumed.initial;
+    let watched = |range: Interval| {
+        if governor::is_limited(&number.governor) {
+            range
+        } else {
+            Interval::ZERO
+        }
+    };
     let net = p + number.damping_most * f;
     let sample = Sample {
         f: state[0],
@@ -71,6 +79,11 @@ pub(super) fn from_rest(number: &FleetLoop, window: Window, memory: usize) -> Op
         slope_response: Interval::ZERO,
         slack: 0.0,
         rate: number.rate_before,
+        governor: watched(meet(state[1], governor::output(&number.governor))),
+        gap: watched(Interval {
+            low: -(number.gain_most * f + g).next_up(),
+            high: (number.gain_most * f + g).next_up(),
+        }),
     };
     let mut bounds = reproduced(number, window, memory, sample, state)?;
     for _ in 0..ROUNDS {
@@ -227,6 +240,8 @@ fn join(a: Sample, b: Sample) -> Sample {
         slope_response: a.slope_response.join(b.slope_response),
         slack: a.slack.max(b.slack),
         rate: a.rate.max(b.rate),
+        governor: a.governor.join(b.governor),
+        gap: a.gap.join(b.gap),
     }
 }
 
@@ -251,11 +266,13 @@ fn grown(outer: Sample, found: Sample) -> Sample {
         turbine: grow(outer.turbine, found.turbine),
         slack: grow_most(outer.slack, found.slack),
         rate: grow_most(outer.rate, found.rate),
+        governor: grow(outer.governor, found.governor),
+        gap: grow(outer.gap, found.gap),
         ..outer
     }
 }
 
-fn pairs(outer: &Sample, inner: &Sample) -> [(Interval, Interval); 7] {
+fn pairs(outer: &Sample, inner: &Sample) -> [(Interval, Interval); 9] {
     [
         (outer.f, inner.f),
         (outer.change, inner.change),
@@ -264,5 +281,7 @@ fn pairs(outer: &Sample, inner: &Sample) -> [(Interval, Interval); 7] {
         (outer.change_slope, inner.change_slope),
         (outer.net, inner.net),
         (outer.turbine, inner.turbine),
+        (outer.governor, inner.governor),
+        (outer.gap, inner.gap),
     ]
 }

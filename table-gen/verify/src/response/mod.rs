@@ -12,6 +12,7 @@
 //! |---|---|
 //! | numbers of the loop, parameter bands | `fleet_loop` |
 //! | lines below and above the delivered participation | `lines` |
+//! | governors with limits, as a disturbance | `governor` |
 //! | one functional, one sweep | `adjoint` |
 //! | the window of readings that act in a step | `window` |
 //! | what is bounded at every sample | `watched` |
@@ -28,6 +29,7 @@ mod event;
 mod fallback;
 mod fleet_loop;
 mod for_ever;
+mod governor;
 mod lines;
 mod meter;
 mod plan;

@@ -6,6 +6,7 @@
 use firmware::response::ResponseLaw;
 use firmware::table::{Hypotheses, LossProfile as Profile, TableView};
 use firmware::units::MICRO;
+use model::governor::Governor;
 use model::interval::Interval;
 use model::plant::Plant;
 use model::spec::Spec;
@@ -158,6 +159,7 @@ fn case(law: &ResponseLaw, table: &TableView<'_>, spec: &Spec) -> Case {
             inertia: band(assumed.inertia_kw_s_per_hz),
             governor_gain: band(assumed.governor_gain_kw_per_hz),
             damping: band(assumed.damping_kw_per_hz),
+            governor: Governor::of(spec),
         },
         law: real_law(law, tick_s, tick_most_s),
         assumed: Assumed {

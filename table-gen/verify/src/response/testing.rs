@@ -1,6 +1,7 @@
 //! The loop of the product's bidirectional spec, for tests.
 
 use super::fleet_loop::{Assumed, Law, LossProfile, PlantBand};
+use model::governor::Governor;
 use model::interval::Interval;
 use model::plant::Plant;
 
@@ -55,5 +56,6 @@ pub(super) fn plant() -> PlantBand {
         inertia: Interval::point(known.inertia),
         governor_gain: Interval::point(known.governor_gain),
         damping: Interval::point(known.damping),
+        governor: Governor::LINEAR,
     }
 }

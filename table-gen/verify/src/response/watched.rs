@@ -4,7 +4,8 @@ use model::interval::Interval;
 
 use super::adjoint::{Choice, Functional, Past};
 use super::fleet_loop::FleetLoop;
-use super::window::{Sample, Window};
+use super::governor;
+use super::window::{Sample, Window, meet};
 
 /// The functionals that are bounded at every sample.
 #[derive(Debug, Clone)]
@@ -22,6 +23,8 @@ const CHANGE_SLOPE: usize = 4;
 const NET: usize = 5;
 const TURBINE: usize = 6;
 const FIRST_STATE: usize = 7;
+/// Watched only where rate or output of the governors is limited.
+const GAP: usize = 10;
 
 impl Watched {
     pub(super) fn new(number: &FleetLoop, window: &Window) -> Self {
@@ -43,6 +46,12 @@ impl Watched {
             },
         ];
         functionals.extend((1..4).map(Functional::state));
+        if governor::is_limited(&number.governor) {
+            functionals.push(Functional {
+                row: [number.gain_mid, -1.0, 0.0, 0.0],
+                ..Functional::state(0)
+            });
+        }
         let best = vec![[(0, 2), (0, 2)]; functionals.len()];
         Self { functionals, best }
     }
@@ -68,6 +77,13 @@ impl Watched {
                 low: -radius,
                 high: radius,
             };
+        let [g, l, p] = [0, 1, 2].map(|axis| ranges[FIRST_STATE + axis]);
+        let g = meet(g, governor::output(&past.loop_.governor));
+        let governor = if ranges.len() > GAP {
+            g
+        } else {
+            Interval::ZERO
+        };
         let sample = Sample {
             f,
             change: ranges[CHANGE],
@@ -79,8 +95,9 @@ impl Watched {
             slope_response: Interval::ZERO,
             slack: 0.0,
             rate: 0.0,
+            governor,
+            gap: ranges.get(GAP).copied().unwrap_or(Interval::ZERO),
         };
-        let [g, l, p] = [0, 1, 2].map(|axis| ranges[FIRST_STATE + axis]);
         (sample, [f, g, l, p])
     }
 }

@@ -9,6 +9,7 @@ use model::interval::Interval;
 
 use super::adjoint::Step;
 use super::fleet_loop::{FleetLoop, LossProfile};
+use super::governor::{self, AtSample};
 use super::lines::{Delivered, Side};
 
 /// |f| \[Hz\] up to which the bounds of the turbine's rate hold; past it nothing is claimed.
@@ -71,6 +72,10 @@ pub(super) struct Sample {
     pub(super) slack: f64,
     /// Bound of |f'| in that step.
     pub(super) rate: f64,
+    /// g, where rate or output of the governors is limited; else 0.
+    pub(super) governor: Interval,
+    /// `K_mid f - g`, there.
+    pub(super) gap: Interval,
 }
 
 impl Sample {
@@ -87,6 +92,8 @@ impl Sample {
             slope_response: meet(self.slope_response, other.slope_response),
             slack: self.slack.min(other.slack),
             rate: self.rate.min(other.rate),
+            governor: meet(self.governor, other.governor),
+            gap: meet(self.gap, other.gap),
         }
     }
 }
@@ -321,7 +328,14 @@ impl Samples<'_> {
         let f_move = share * (start + drift) / (1.0 - share * self.number.damping_most);
         let net_most = start + drift + self.number.damping_most * f_move;
         let spread = most - least;
+        let at = sample.map(|sample| AtSample {
+            f,
+            g: sample.governor,
+            gap: sample.gap,
+            f_move: f_move * (1.0 + 1e-9),
+        });
         Step {
+            governor: at.and_then(|at| governor::disturbance(self.number, &at)),
             below,
             above,
             f_most: (f.magnitude() + f_move) * (1.0 + 1e-9),
@@ -346,8 +360,8 @@ impl Samples<'_> {
         let number = self.number;
         let [f, g, l, _] = number.chain_most(F_MOST_HZ);
         let lead = number.known.lead_time / number.known.governor_time;
-        let l_rate = (lead.abs() * number.gain_most * f + (1.0 - lead).abs() * g + l)
-            / number.known.lag_time;
+        let asked = g.max(number.gain_most * f);
+        let l_rate = (lead.abs() * asked + (1.0 - lead).abs() * g + l) / number.known.lag_time;
         let start = sample.map_or(f64::INFINITY, |s| s.turbine.magnitude());
         (start / number.known.turbine_time).max(l_rate) * (1.0 + 1e-9)
     }
