@@ -7,6 +7,7 @@
 //! | [`fleet`] | a table | the same with one firmware for each charger |
 //! | [`record`] | a recorded frequency as text | samples at one interval |
 //! | [`compare`] | a table | a scorecard: no response, droop, table and the limit side by side |
+//! | [`identify`] | a recorded event | the plant behind it, with intervals |
 //! | [`replay`] | a recorded frequency | what the firmware would have done |
 //! | [`falsify`] | a table and a spec | a real trajectory that breaks a claim |
 //! | [`counterfactual`] | a recorded event | what it would have been with the chargers |
@@ -20,6 +21,7 @@ pub mod compare;
 pub mod counterfactual;
 pub mod falsify;
 pub mod fleet;
+pub mod identify;
 pub mod record;
 pub mod replay;
 pub mod report;

@@ -17,6 +17,7 @@ mod files;
 mod fleet;
 mod formula;
 mod groups;
+mod identify;
 mod inspect;
 mod keys;
 mod monitor;
@@ -79,6 +80,8 @@ enum Command {
     Fleet(fleet::FleetArgs),
     /// One HTML page with the figures of the paper and more, and each figure as .svg and .csv
     Report(report::ReportArgs),
+    /// The plant behind a recorded event: parameters with intervals, as a spec
+    Identify(identify::IdentifyArgs),
     /// Run the firmware on a recorded frequency
     Replay(replay::ReplayArgs),
     /// Check the bytes of a table against a spec, independently of how they were made
@@ -124,6 +127,7 @@ pub(crate) fn run() -> ExitCode {
         Command::Counterfactual(args) => counterfactual::run(&args),
         Command::Fleet(args) => fleet::run(&args),
         Command::Report(args) => report::run(&args),
+        Command::Identify(args) => identify::run(&args),
         Command::Replay(args) => replay::run(&args),
         Command::Verify(args) => verify::run(&args),
         Command::Prob(args) => prob::run(&args),
