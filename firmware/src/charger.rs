@@ -335,7 +335,7 @@ impl<'t, S: FrequencySource, D: Dispatch, W: Watchdog> Charger<'t, S, D, W> {
             } else {
                 from.wrapping_add_unsigned(way)
             };
-            self.advance(at);
+            self.advance(at, n == due);
             if n < due {
                 self.control.pass(at);
             }
@@ -349,11 +349,16 @@ impl<'t, S: FrequencySource, D: Dispatch, W: Watchdog> Charger<'t, S, D, W> {
         }
     }
 
-    /// One tick of the observer.
-    fn advance(&mut self, f_uhz: i32) {
+    /// One tick of the observer. Of several that are caught up only the last is asked for an
+    /// estimate.
+    fn advance(&mut self, f_uhz: i32, last: bool) {
         self.f_uhz = f_uhz;
         let acting = self.control.acting(self.standing.participation);
         self.standing.state = match &mut self.observer {
+            Some(observer) if !last => {
+                observer.pass(f_uhz, acting);
+                return;
+            }
             Some(observer) => {
                 let state = observer.step(f_uhz);
                 self.standing.loss_kw = observer.loss_kw(acting);
@@ -428,8 +433,8 @@ impl<'t, S: FrequencySource, D: Dispatch, W: Watchdog> Charger<'t, S, D, W> {
             self.standing.mode = Mode::Hold;
             // The chain follows the last frequency; the loss estimate would see a kink that was not
             // there.
-            for _ in 0..due {
-                self.advance(self.f_uhz);
+            for n in 1..=due {
+                self.advance(self.f_uhz, n == due);
             }
         } else {
             self.standing.mode = Mode::Safe;

@@ -121,6 +121,19 @@ fn exponential(m: &[[f32; AUGMENTED]; AUGMENTED]) -> [[f32; AUGMENTED]; AUGMENTE
     sum
 }
 
+/// The largest whole number that is not above, saturating; 0 for no number.
+///
+/// Converting drops the fraction, which is one too many where it was negative. A float without a
+/// fraction converts back exactly, and from 2^23 on no float has one.
+const fn floor(value: f32) -> i32 {
+    let whole = value as i32;
+    if whole as f32 > value {
+        whole.saturating_sub(1)
+    } else {
+        whole
+    }
+}
+
 /// The chain's state as the device knows it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Observer {
@@ -153,6 +166,20 @@ impl Observer {
 
     /// Takes the frequency deviation measured at this tick \[µHz\] and returns the state estimate.
     pub fn step(&mut self, f_uhz: i32) -> State {
+        self.advance(f_uhz);
+        self.estimate(f_uhz)
+    }
+
+    /// Both for a tick whose estimates nobody asks for: as [`Observer::step`] and
+    /// [`Observer::loss_kw`], without their last roundings.
+    pub fn pass(&mut self, f_uhz: i32, fleet: Participation) {
+        self.advance(f_uhz);
+        let [_, _, p] = self.chain;
+        let fleet_gw = self.fleet_gw(fleet);
+        self.loss.note(&self.config, p, self.f_hz, fleet_gw);
+    }
+
+    fn advance(&mut self, f_uhz: i32) {
         let f_hz = f_uhz as f32 / MICRO as f32;
         let [g, l, p] = self.chain;
         let input = [g, l, p, self.f_hz, f_hz - self.f_hz];
@@ -164,15 +191,19 @@ impl Observer {
             *next = acc;
         }
         self.f_hz = f_hz;
-        self.estimate(f_uhz)
     }
 
     /// The lost power \[kW\], once a tick after [`Observer::step`]: `fleet` is the participation in
     /// force during the tick that ended. `None` until [`loss::WINDOW_TICKS`] ticks have been seen.
     pub fn loss_kw(&mut self, fleet: Participation) -> Option<i32> {
         let [_, _, p] = self.chain;
-        let fleet_gw = fleet.ppm() as f32 * self.config.fleet_gw_per_ppm;
+        let fleet_gw = self.fleet_gw(fleet);
         self.loss.step(&self.config, p, self.f_hz, fleet_gw)
+    }
+
+    /// Power of the fleet at this participation \[GW\].
+    const fn fleet_gw(&self, fleet: Participation) -> f32 {
+        fleet.ppm() as f32 * self.config.fleet_gw_per_ppm
     }
 
     /// Forgets the loss estimate's window, after a gap in the readings.
@@ -182,7 +213,7 @@ impl Observer {
 
     /// The estimate as it stands, with this frequency \[µHz\].
     fn estimate(&self, f_uhz: i32) -> State {
-        let micro = |gw: f32| libm::floorf(gw * MICRO as f32) as i32;
+        let micro = |gw: f32| floor(gw * MICRO as f32);
         let [g, l, p] = self.chain;
         State([f_uhz, micro(g), micro(l), micro(p)])
     }
@@ -215,6 +246,38 @@ mod tests {
         };
         let error = ObserverError::TimeConstantTooShort;
         assert_eq!(ObserverConfig::new(&plant, TICK_MS), Err(error));
+    }
+
+    proptest! {
+        /// Every float, by its bits, and those around whole numbers.
+        #[test]
+        fn floor_is_floor(bits: u32, near in -20_000_000i32..20_000_000, off in -2i32..=2) {
+            let around = (near as f32).to_bits().wrapping_add_signed(off);
+            for bits in [bits, around] {
+                let value = f32::from_bits(bits);
+                prop_assert_eq!(floor(value), libm::floorf(value) as i32);
+            }
+        }
+
+        /// Ticks that are passed leave the same observer as ticks that are asked.
+        #[test]
+        fn a_passed_tick_is_a_tick(
+            ticks in proptest::collection::vec((-900_000i32..900_000, 0u32..=1_000_000, any::<bool>()), 1..60),
+        ) {
+            let config = ObserverConfig::new(&PlantParameters::PAPER, 100).unwrap();
+            let start = Observer::at_rest(config, &PlantParameters::PAPER, 0);
+            let (mut asked, mut passed) = (start, start);
+            for (f_uhz, ppm, pass) in ticks {
+                let fleet = Participation::from_ppm(ppm);
+                let answers = (asked.step(f_uhz), asked.loss_kw(fleet));
+                if pass {
+                    passed.pass(f_uhz, fleet);
+                } else {
+                    prop_assert_eq!((passed.step(f_uhz), passed.loss_kw(fleet)), answers);
+                }
+                prop_assert_eq!(asked, passed);
+            }
+        }
     }
 
     proptest! {

@@ -9,7 +9,7 @@
 //! the estimate is exact up to the error bound of [`LossEstimator::error_kw`] once the window lies
 //! behind the onset: W h = 1 s.
 
-use super::ObserverConfig;
+use super::{ObserverConfig, floor};
 use crate::units::MICRO;
 
 /// Ticks of the window.
@@ -46,7 +46,27 @@ impl LossEstimator {
         f_hz: f32,
         fleet_gw: f32,
     ) -> Option<i32> {
-        let (p_before, f_before) = self.last.replace((p_gw, f_hz))?;
+        self.note(config, p_gw, f_hz, fleet_gw);
+        if self.filled < WINDOW_TICKS {
+            return None;
+        }
+        // The slot that the next tick overwrites is the oldest.
+        let oldest_hz = self.start_hz.get(self.next).copied().unwrap_or(f_hz);
+        let mut sum = 0.0;
+        for power in self.power_gw {
+            sum += power;
+        }
+        let mean = sum / WINDOW_TICKS as f32;
+        let slope = (f_hz - oldest_hz) / (WINDOW_TICKS as f32 * config.tick_s);
+        let loss = mean - config.twice_inertia * slope;
+        Some(floor(loss * MICRO as f32))
+    }
+
+    /// The same for a tick whose loss nobody asks for.
+    pub(super) fn note(&mut self, config: &ObserverConfig, p_gw: f32, f_hz: f32, fleet_gw: f32) {
+        let Some((p_before, f_before)) = self.last.replace((p_gw, f_hz)) else {
+            return;
+        };
         let power = 0.5 * (p_before + p_gw) - config.damping * (0.5 * (f_before + f_hz)) + fleet_gw;
         if let (Some(slot), Some(start)) = (
             self.power_gw.get_mut(self.next),
@@ -61,19 +81,6 @@ impl LossEstimator {
             0
         };
         self.filled = (self.filled + 1).min(WINDOW_TICKS);
-        if self.filled < WINDOW_TICKS {
-            return None;
-        }
-        // The slot that the next tick overwrites is the oldest.
-        let oldest_hz = self.start_hz.get(self.next).copied().unwrap_or(f_hz);
-        let mut sum = 0.0;
-        for power in self.power_gw {
-            sum += power;
-        }
-        let mean = sum / WINDOW_TICKS as f32;
-        let slope = (f_hz - oldest_hz) / (WINDOW_TICKS as f32 * config.tick_s);
-        let loss = mean - config.twice_inertia * slope;
-        Some(libm::floorf(loss * MICRO as f32) as i32)
     }
 
     /// Forgets the window, after a gap in the readings.
