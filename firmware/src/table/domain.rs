@@ -118,7 +118,7 @@ impl<'t> DomainView<'t> {
             spaces,
             hull: *hull,
             aheads,
-            nodes: NodesView::parse(nodes, exists)?,
+            nodes: NodesView::parse(nodes, &exists)?,
         })
     }
 

@@ -39,7 +39,8 @@ pub(super) struct NodesView<'t> {
 impl<'t> NodesView<'t> {
     /// Checks that the bytes are one tree, that every subtree ends where its parent says, and that
     /// `leaf` accepts all leaves.
-    pub(super) fn parse(nodes: &'t [u8], leaf: impl Fn(u8) -> bool) -> Result<Self, BlockError> {
+    #[inline(never)]
+    pub(super) fn parse(nodes: &'t [u8], leaf: &dyn Fn(u8) -> bool) -> Result<Self, BlockError> {
         if let [only] = nodes {
             return if leaf(*only) {
                 Ok(Self {
@@ -229,7 +230,7 @@ impl<'t> TreeView<'t> {
         Ok(Self {
             pieces,
             levels,
-            nodes: NodesView::parse(nodes, exists)?,
+            nodes: NodesView::parse(nodes, &exists)?,
         })
     }
 
@@ -337,7 +338,7 @@ mod tests {
             cells in proptest::collection::vec(proptest::array::uniform4(prop_oneof![0u16..40, 0u16..3000]), 40),
         ) {
             let nodes = grow(&mut recipe.into_iter(), 9);
-            let view = NodesView::parse(&nodes, |_| true).unwrap();
+            let view = NodesView::parse(&nodes, &|_| true).unwrap();
             for cell in cells {
                 let (leaf, visits) = slowly(&nodes, Cell(cell));
                 prop_assert_eq!(view.leaf(Cell(cell)), Some(leaf));
