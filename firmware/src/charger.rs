@@ -210,6 +210,11 @@ impl<'t, S: FrequencySource, D: Dispatch, W: Watchdog> Charger<'t, S, D, W> {
         self.control.table()
     }
 
+    /// What the proof of the table assumed otherwise.
+    pub const fn misfits(&self) -> Misfits {
+        self.misfits
+    }
+
     /// The source, to hand it captures.
     pub const fn source_mut(&mut self) -> &mut S {
         &mut self.source

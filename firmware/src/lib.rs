@@ -17,6 +17,7 @@
 //! | [`event`] | f over minutes | the end of an event, and the way back to ordinary charging |
 //! | [`dispatch`] | a participation | this charger's current or power |
 //! | [`charger`] | one reading a tick | the above, and a [`fault`] state for what is missing |
+//! | [`limit_provider`] | a reading and the other limits | what may be drawn, for other firmware |
 //! | [`board`] | a board's time and lines | the loop that ticks the charger |
 //! | [`telemetry`] | a tick's report | a frame on a serial line |
 //! | [`flash`] | a flash region | the table's bytes |
@@ -81,6 +82,8 @@ pub mod dispatch;
 pub mod fault;
 
 pub mod charger;
+
+pub mod limit_provider;
 
 pub mod board;
 
