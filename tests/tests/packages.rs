@@ -66,13 +66,14 @@ fn the_verifier_depends_on_model_and_firmware_alone() {
 /// anything.
 #[test]
 fn the_runners_are_built_without_the_engine() {
-    assert_eq!(reached("fw"), names(&["firmware", "model"]));
+    assert_eq!(reached("fw"), names(&["c-api", "firmware", "model"]));
     assert_eq!(reached("test-all"), names(&[]));
 }
 
 #[test]
 fn nothing_flows_back() {
     assert_eq!(reached("firmware"), names(&[]));
+    assert_eq!(reached("c-api"), names(&["firmware"]));
     assert_eq!(reached("model"), names(&["firmware"]));
     assert_eq!(reached("synth"), names(&["firmware", "model"]));
     assert_eq!(reached("lab"), names(&["firmware", "model"]));
