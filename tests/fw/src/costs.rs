@@ -4,6 +4,7 @@
 //! |---|---|---|
 //! | `sizes.txt` | flash and static RAM by section, panics, allocation, float text | ELF files |
 //! | `run.txt` | stack, instructions of a lookup and of a tick | QEMU: paint, timer by `-icount` |
+//! | `c-api.txt` | the same of the C interface: `cargo fw c-api` | C programs, linked and run |
 //!
 //! A figure past its goal fails, but for the misses that the file already states: those are told at
 //! every run. The text itself must be equal as well, as long as compiler and table are those that
@@ -83,7 +84,7 @@ pub struct Figures {
 }
 
 impl Figures {
-    fn line(&mut self, name: &str, value: u32, unit: &str, goal: Option<u32>) {
+    pub(crate) fn line(&mut self, name: &str, value: u32, unit: &str, goal: Option<u32>) {
         let goal_text = match goal {
             None => String::new(),
             Some(goal) if value <= goal => format!("  goal at most {goal}"),
@@ -97,7 +98,7 @@ impl Figures {
         self.text.push('\n');
     }
 
-    fn note(&mut self, text: &str) {
+    pub(crate) fn note(&mut self, text: &str) {
         let _ = writeln!(self.text, "# {text}");
     }
 
@@ -164,7 +165,7 @@ fn difference(old: &str, new: &str) -> String {
     text
 }
 
-fn compiler() -> String {
+pub(crate) fn compiler() -> String {
     let output = Command::new("rustc").arg("--version").output();
     output.map_or_else(
         |_| "unknown compiler".into(),
@@ -173,7 +174,7 @@ fn compiler() -> String {
 }
 
 /// Demangled enough to search in: the path parts are in the mangled name as they are.
-fn count(symbols: &[String], parts: &[&str]) -> u32 {
+pub(crate) fn count(symbols: &[String], parts: &[&str]) -> u32 {
     let hit = |name: &&String| parts.iter().any(|part| name.contains(part));
     symbols.iter().filter(hit).count() as u32
 }

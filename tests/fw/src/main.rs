@@ -12,6 +12,8 @@ use firmware::link::session::{Session, Wires};
 use firmware::link::{Request, Setup, SourceKind};
 use firmware::table::TableView;
 
+use fw::c_api::program::{CORTEX_M0, CORTEX_M4};
+use fw::c_api::{self, CApiError};
 use fw::costs::{self, CostError};
 use fw::images::{self, Elf, Image, PIL, PRODUCTS};
 use fw::pil::machine::{self, Machine};
@@ -26,6 +28,11 @@ use fw::table_fit::{self, Built, Candidate};
 const TABLE: &str = "firmware/tables/paper-bi.bin";
 /// A table whose commands act late.
 const LATE_TABLE: &str = "firmware/tables/gb-bi-delay.bin";
+
+/// Tables over which the C interface is measured: by games, and a response.
+const C_COST_TABLES: [&str; 2] = ["paper-bi", "gb-bi"];
+/// Table of the C example.
+const C_EXAMPLE_TABLE: &str = "firmware/tables/gb-uni.bin";
 
 /// Most random scenarios with commands that act late.
 const LATE_SCENARIOS_MAX: u64 = 200;
@@ -72,6 +79,22 @@ enum Command {
         /// The core
         #[arg(long, value_enum, default_value_t = Core::M4)]
         core: Core,
+    },
+    /// The C interface: static libraries, a bare C program in QEMU against the host, costs, the
+    /// CMake package
+    CApi {
+        /// Random scenarios
+        #[arg(long, default_value_t = 1000)]
+        scenarios: u64,
+        /// Ticks of a random scenario (100 ms each)
+        #[arg(long, default_value_t = 600)]
+        ticks: u32,
+        /// Folder of the package
+        #[arg(long, default_value = "out/c-api")]
+        out: PathBuf,
+        /// Take the figures over
+        #[arg(long)]
+        bless: bool,
     },
     /// Measure flash, RAM, stack and instructions, and compare with firmware/expected
     Costs {
@@ -133,6 +156,12 @@ fn main() -> ExitCode {
             table,
             core,
         } => processor_in_the_loop(scenarios, ticks.max(1), table.as_deref(), core.machine()),
+        Command::CApi {
+            scenarios,
+            ticks,
+            out,
+            bless,
+        } => c_interface((scenarios, ticks.max(1)), &root().join(out), bless),
         Command::Costs { bless } => measure(bless),
     };
     match result {
@@ -141,7 +170,8 @@ fn main() -> ExitCode {
             eprintln!("error: {error}");
             let wrong = matches!(error.downcast_ref(), Some(CostError::Wrong(_)));
             let differs = matches!(error.downcast_ref(), Some(qemu::PilError::Differs(_)));
-            ExitCode::from(if wrong || differs { 1 } else { 2 })
+            let in_c = matches!(error.downcast_ref(), Some(CApiError::Differs(_)));
+            ExitCode::from(if wrong || differs || in_c { 1 } else { 2 })
         }
     }
 }
@@ -376,6 +406,25 @@ fn tell(what: &str, outcome: &Outcome) {
         outcome.most,
         outcome.faults
     );
+}
+
+fn c_interface((scenarios, ticks): (u64, u32), out: &Path, bless: bool) -> Result<(), AnyError> {
+    let libraries = c_api::libraries()?;
+    c_api::compare(&libraries, scenarios, ticks)?;
+    c_api::package::write(&libraries, out)?;
+    let said = c_api::package::build_with_cmake(out, C_EXAMPLE_TABLE)?;
+    println!("the example, built by CMake with {}:", out.display());
+    for line in said.lines() {
+        println!("    {line}");
+    }
+    let mut tables = Vec::new();
+    for name in C_COST_TABLES {
+        tables.push((name, c_api::table(name)?));
+    }
+    let library = |place| c_api::library_of(place, &libraries);
+    let figures = c_api::costs::measure(library(CORTEX_M4)?, library(CORTEX_M0)?, &tables)?;
+    print!("{}", figures.text());
+    Ok(figures.check("c-api.txt", bless)?)
 }
 
 fn measure(bless: bool) -> Result<(), AnyError> {

@@ -54,6 +54,7 @@ pub(crate) const STEPS: &[Step] = &[
     Step::cargo("pil", 90, "the emulated processor and the host act alike, to the bit", "fw pil"),
     Step::cargo("pil-m0", 60, "code for Cortex-M0+, with floating point in software, acts alike to the bit", "fw pil --core m0 --scenarios 200"),
     Step::cargo("pil-riscv", 60, "RV32IMC, with floating point in software, acts alike to the bit", "fw pil --core riscv --scenarios 200"),
+    Step::cargo("c-api", 45, "bare C on emulated Cortex-M and the host act alike to the bit; size, stack and instructions are as committed; CMake builds with the package", "fw c-api"),
     Step::cargo("costs", 60, "flash, RAM, stack and instructions are within their goals and as committed", "fw costs"),
 ];
 

@@ -46,6 +46,21 @@ const TOOLS: &[Tool] = &[
         why: "checks licences, and builds and tests the Python package",
     },
     Tool {
+        programs: &["arm-none-eabi-gcc"],
+        packages: &["gcc-arm-none-eabi"],
+        why: "builds the bare C program for the C interface",
+    },
+    Tool {
+        programs: &["c++"],
+        packages: &["g++"],
+        why: "compiles the C interface's header as C++",
+    },
+    Tool {
+        programs: &["cmake"],
+        packages: &["cmake", "make"],
+        why: "builds a C program with the C interface's package",
+    },
+    Tool {
         programs: &["chromium", "chromium-browser", "google-chrome"],
         packages: &["chromium", "fonts-liberation"],
         why: "opens the HTML report and checks what a reader sees",
@@ -185,7 +200,7 @@ mod tests {
         assert!(
             text.contains("apt-get install -y --no-install-recommends qemu-system-arm chromium")
         );
-        assert!(text.contains("missing: qemu-system-arm, qemu-system-riscv32, python3, chromium"));
+        assert!(text.contains("missing: qemu-system-arm, qemu-system-riscv32, python3, arm-none-eabi-gcc"));
         // Where no list knows either, the last is named.
         assert_eq!(of_this_release("no-such-package|nor-this"), "nor-this");
     }
