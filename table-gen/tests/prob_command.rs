@@ -1,4 +1,5 @@
 //! `prob` as a person runs it: keys, files, exit codes.
+#![allow(clippy::unwrap_used, reason = "a test that cannot go on fails")]
 
 use std::path::PathBuf;
 use std::process::{Command, Output};

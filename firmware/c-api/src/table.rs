@@ -2,6 +2,7 @@
 
 use firmware::charger::misfits;
 use firmware::flash;
+use firmware::frequency::filter::Filter;
 use firmware::table::{TableError, TableView};
 use firmware::telemetry::TableId;
 
@@ -113,9 +114,9 @@ pub unsafe extern "C" fn holdfast_compare(
             let (config, _) = settings::checked(&config)?;
             let table =
                 TableView::parse(flash::image(region)).map_err(|_| Status::TableRejected)?;
-            let ticks = config.charger.filter_ticks;
+            let filter = Filter::new(config.charger.filter_ticks);
             let installation = &config.installation;
-            Ok(misfits(table.header(), installation, config.meter, ticks))
+            Ok(misfits(table.header(), installation, config.meter, &filter))
         })
     };
     let (bits, status) = match compared {

@@ -4,6 +4,7 @@
 //! Plants, losses and moments are drawn at random; records are made by the laboratory's own stepper
 //! (10 ms) and rounded to 1 mHz, as records are published. All thirteen intervals must hold at
 //! once.
+#![allow(clippy::unwrap_used, reason = "a test that cannot go on fails")]
 
 use lab::identify::course::Stage;
 use lab::identify::forecast::{Event, forecast};

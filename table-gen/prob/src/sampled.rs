@@ -77,8 +77,8 @@ impl<'a> Sampled<'a> {
             participation,
             fleet_gw: plant.fleet,
             step: (
-                flow.phi.map(|row| row.map(|entry| entry.mid())),
-                flow.gamma.map(|entry| entry.mid()),
+                flow.phi.map(|row| row.map(model::interval::Interval::mid)),
+                flow.gamma.map(model::interval::Interval::mid),
             ),
             ticks: (horizon_s / tick_s).ceil() as u32,
         }
@@ -212,7 +212,7 @@ impl<'a> Sampled<'a> {
     pub fn many(&self, runs: u32, seed: u64, go_on: &(dyn Fn() -> bool + Sync)) -> Option<Runs> {
         let one = |index: u32| {
             let seed = seed.wrapping_add(u64::from(index));
-            (index % 64 != 0 || go_on()).then(|| (seed, self.run(seed)))
+            (!index.is_multiple_of(64) || go_on()).then(|| (seed, self.run(seed)))
         };
         let all: Vec<(u64, Run)> = (0..runs.clamp(1, RUNS_MAX))
             .into_par_iter()

@@ -200,7 +200,11 @@ mod tests {
         assert!(
             text.contains("apt-get install -y --no-install-recommends qemu-system-arm chromium")
         );
-        assert!(text.contains("missing: qemu-system-arm, qemu-system-riscv32, python3, arm-none-eabi-gcc"));
+        assert!(
+            text.contains(
+                "missing: qemu-system-arm, qemu-system-riscv32, python3, arm-none-eabi-gcc"
+            )
+        );
         // Where no list knows either, the last is named.
         assert_eq!(of_this_release("no-such-package|nor-this"), "nor-this");
     }
