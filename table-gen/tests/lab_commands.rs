@@ -239,7 +239,7 @@ fn the_report_the_runs_and_the_replays_agree() {
         assert_eq!(&simulate[key], value, "{key}");
     }
     let nadir = simulate["nadir_hz"].as_f64().unwrap();
-    assert!(page.contains(&format!("<td>{nadir:.4}</td>")));
+    assert!(page.contains(&format!("<td>{nadir:.3}")));
     let runs = [
         "simulate",
         "paper-bi",

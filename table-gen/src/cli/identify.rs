@@ -247,6 +247,16 @@ fn print(found: &Identified) {
         "all intervals hold at once with {} % if the errors are as assumed",
         100.0 * found.confidence
     ));
+    let time_constants = found.parameters.iter().any(|it| {
+        let is_time = it.key.starts_with("plant.") && it.key.ends_with("_time_s");
+        is_time && it.told != Told::Given
+    });
+    if time_constants {
+        output::line(
+            "the time constants were looked for as well: such intervals are a hint, and hold less \
+             often than that (docs/identification.md)",
+        );
+    }
     if let Some(slope) = &found.first_second {
         output::line(format_args!(
             "inertia by the first {:.1} s alone: {:.3} GW s/Hz from {} samples, rather too large than too small",
