@@ -100,7 +100,7 @@ pub fn budget(budget: Option<&Budget>) -> Section {
             room.part.core.clone(),
             room.part.flash_kib.to_string(),
             room.left_bytes.to_string(),
-            format!("{} %", four(100.0 * room.share)),
+            format!("{} %", digits::four(100.0 * room.share)),
         ]);
     }
     section.tables.push(rooms);
