@@ -69,8 +69,16 @@ fn a_changed_coefficient_and_another_delay_are_rejected() {
         let verdict = judge(&mutant, &spec);
         assert!(!verdict.verified, "word {word}");
     }
-    // One unit in the last place is within what the proof has room for, and it says so.
-    assert!(judge(&with(third, &|value| value + 1), &spec).verified);
+    // One unit in the last place is within what the exploration has room for, and it says so; but
+    // the table is not the one that the spec asks for.
+    let nearly = judge(&with(third, &|value| value + 1), &spec);
+    let open: Vec<ClaimName> = nearly
+        .claims
+        .iter()
+        .filter(|claim| !claim.holds)
+        .map(|claim| claim.name)
+        .collect();
+    assert_eq!(open, [ClaimName::Header]);
     let longer = delayed(&["uncertainty.actuation_delay_s=1.1"]);
     let none = delayed(&["uncertainty.actuation_delay_s=0"]);
     for other in [longer, none] {
