@@ -4,8 +4,8 @@
 //! it there. From then on the plant is integrated by the classical Runge-Kutta method in steps that
 //! end on every loss; samples between two steps are read off the cubic through both ends and their
 //! slopes. With steps of 50 ms the error of a lag of 0.1 s is (h / T)⁵ / 120 = 3e-4 of what it lags
-//! by in a step, which for a governor chain is below 10 MW and so below a microhertz. A limit of the
-//! governors that begins or ends within a step adds to that; a test holds all of it below a tenth
+//! by in a step, which for a governor chain is below 10 MW and so below a microhertz. A limit of
+//! the governors that begins or ends within a step adds to that; a test holds all below a tenth
 //! of a millihertz.
 
 use model::plant::STATES;

@@ -124,7 +124,8 @@ fn real_law(law: &ResponseLaw, tick_s: f64, tick_most_s: f64) -> Law {
     }
 }
 
-/// The case of a table and a spec, before it is cut into bands: for bounds under other assumptions than the header's.
+/// The case of a table and a spec, before it is cut into bands: for bounds under other assumptions
+/// than the header's.
 ///
 /// # Errors
 /// A table that is no response.
