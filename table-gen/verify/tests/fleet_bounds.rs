@@ -13,7 +13,9 @@ use model::plant::Plant;
 use rand::RngExt;
 use rand_pcg::Pcg64;
 use rand_pcg::rand_core::SeedableRng;
-use verify::response::{Assumed, Case, Found, Law, LossProfile, PlantBand, Resolution, examine};
+use verify::response::{
+    Assumed, Case, Found, LossProfile, PlantBand, RealLaw, Resolution, examine,
+};
 
 const FLEET_GW: f64 = 1.4;
 const TICK_S: f64 = 0.1;
@@ -63,7 +65,7 @@ fn case(loss: Interval, governor: Governor) -> Case {
             damping: Interval::point(known.damping),
             governor,
         },
-        law: Law {
+        law: RealLaw {
             droop: share(LAW.droop_gain_ppm_per_hz),
             setpoint_hz: -0.042,
             slope: share(LAW.slope_gain_ppm_s_per_hz),

@@ -67,14 +67,14 @@ pub enum Kind<'s, 't> {
     Table(&'s TableView<'t>),
 }
 
-/// The law of one charger.
+/// What one charger responds with.
 #[derive(Debug, Clone)]
-enum Law<'t> {
+enum Responder<'t> {
     Droop(Droop),
     Table(Box<(ControlLoop<'t>, Observer)>),
 }
 
-impl Law<'_> {
+impl Responder<'_> {
     /// The same law with the levels of a serial number.
     fn of_serial(&self, serial: u32) -> Self {
         match self {
@@ -90,7 +90,7 @@ impl Law<'_> {
 
 #[derive(Debug, Clone)]
 struct Charger<'t> {
-    law: Law<'t>,
+    law: Responder<'t>,
     random: Pcg32,
     /// Parts of a tick from a decision to its power.
     delay_parts: usize,
@@ -128,11 +128,11 @@ impl<'t> Chargers<'t> {
         tick_ms: u16,
     ) -> Result<Self, ObserverError> {
         let law = match kind {
-            Kind::Droop(spec) => Law::Droop(droop(spec)),
+            Kind::Droop(spec) => Responder::Droop(droop(spec)),
             Kind::Table(table) => {
                 let plant = &table.header().plant;
                 let observer = ObserverConfig::new(plant, tick_ms)?;
-                Law::Table(Box::new((
+                Responder::Table(Box::new((
                     ControlLoop::with_table(Ok((*table).clone())),
                     Observer::at_rest(observer, plant, 0),
                 )))
@@ -208,8 +208,8 @@ impl Charger<'_> {
         let error = (meter_uhz * symmetric(&mut self.random)).round() as i32;
         let read = f_uhz.saturating_add(error);
         let participation = match &mut self.law {
-            Law::Droop(droop) => droop.participation(State([read, 0, 0, 0])),
-            Law::Table(table) => {
+            Responder::Droop(droop) => droop.participation(State([read, 0, 0, 0])),
+            Responder::Table(table) => {
                 let (firmware, observer) = &mut **table;
                 firmware.step(observer.step(read)).participation
             }

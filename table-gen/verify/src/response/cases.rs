@@ -3,7 +3,7 @@
 use model::interval::Interval;
 
 use super::event::Event;
-use super::fleet_loop::{Assumed, FleetLoop, Law, LossProfile, PlantBand};
+use super::fleet_loop::{Assumed, FleetLoop, LossProfile, PlantBand, RealLaw};
 use super::for_ever;
 use super::window::{F_MOST_HZ, Window};
 
@@ -24,7 +24,7 @@ pub struct Case {
     /// The plant.
     pub plant: PlantBand,
     /// The law.
-    pub law: Law,
+    pub law: RealLaw,
     /// The assumptions, with the band of the loss.
     pub assumed: Assumed,
     /// Where in the band the loss is in the end; the whole band if it is constant.

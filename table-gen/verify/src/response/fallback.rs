@@ -10,7 +10,7 @@ use firmware::units::MICRO;
 use model::verdict::{Claim, ClaimName};
 
 use super::cases::{Case, Found};
-use super::fleet_loop::Law;
+use super::fleet_loop::RealLaw;
 use super::plan::{Summary, examine_all};
 
 /// Lowest deviation after an infrequent loss \[Hz\].
@@ -21,9 +21,9 @@ const INFREQUENT_GW: f64 = 1.8;
 const LOSS_BAND_GW: f64 = 0.1;
 
 /// The droop as a law.
-fn law(droop: Droop, of: Law) -> Law {
+fn law(droop: Droop, of: RealLaw) -> RealLaw {
     let hz = |uhz: u32| f64::from(uhz) / f64::from(MICRO);
-    Law {
+    RealLaw {
         droop: 1.0 / hz(droop.full_uhz),
         setpoint_hz: -hz(droop.deadband_uhz),
         slope: 0.0,

@@ -10,7 +10,7 @@ use model::plant::{Plant, STATES};
 
 /// The always-on law in real numbers, as the device's integers give it.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Law {
+pub struct RealLaw {
     /// Droop gain \[1/Hz\]: participation per Hz below the set-point.
     pub droop: f64,
     /// Set-point \[Hz\].
@@ -93,7 +93,7 @@ pub struct Assumed {
 #[derive(Debug, Clone)]
 pub struct FleetLoop {
     /// The law.
-    pub law: Law,
+    pub law: RealLaw,
     /// The assumptions.
     pub assumed: Assumed,
     /// P \[GW\].
@@ -151,7 +151,7 @@ pub struct FleetLoop {
 
 impl FleetLoop {
     /// The numbers of one case, with steps of `step_s`.
-    pub fn new(plant: &PlantBand, law: Law, assumed: Assumed, step_s: f64) -> Self {
+    pub fn new(plant: &PlantBand, law: RealLaw, assumed: Assumed, step_s: f64) -> Self {
         let half_inverse = |h: Interval| Interval::point(0.5) / h;
         let inverse = half_inverse(plant.inertia);
         let nominal = Plant {

@@ -22,7 +22,7 @@
 //! it on the whole interval; the supporting lines of the convex hull of those points are such
 //! lines. Which of them is best depends on where the worst trajectory runs, so several are kept.
 
-use super::fleet_loop::{Assumed, Law};
+use super::fleet_loop::{Assumed, RealLaw};
 use model::interval::Interval;
 
 /// Lines that are kept for each step, by where in the interval of f they touch: at its low end, its
@@ -57,7 +57,7 @@ pub(super) enum Side {
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Delivered<'a> {
     /// The law.
-    pub(super) law: &'a Law,
+    pub(super) law: &'a RealLaw,
     /// The assumptions.
     pub(super) assumed: &'a Assumed,
     /// The side.

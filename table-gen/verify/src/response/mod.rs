@@ -40,7 +40,7 @@ mod watched;
 mod window;
 
 pub use cases::{Case, Found, Resolution, examine};
-pub use fleet_loop::{Assumed, FleetLoop, Law, LossProfile, PlantBand};
+pub use fleet_loop::{Assumed, FleetLoop, LossProfile, PlantBand, RealLaw};
 pub use meter::error_hz;
 pub use plan::{LOSS_BAND_GW, Summary, cases, examine_all};
 pub use proof::{Proof, case_of, verify};

@@ -14,7 +14,7 @@ use model::verdict::{Claim, ClaimName, Counts, Method};
 
 use super::cases::{Case, Found};
 use super::fallback;
-use super::fleet_loop::{Assumed, Law, LossProfile, PlantBand};
+use super::fleet_loop::{Assumed, LossProfile, PlantBand, RealLaw};
 use super::meter;
 use super::plan::{LOSS_BAND_GW, Summary, examine_all};
 use crate::VerifyError;
@@ -108,8 +108,8 @@ fn band<T: Into<f64> + Copy>(ends: [T; 2]) -> Interval {
 }
 
 /// The law in real numbers.
-fn real_law(law: &ResponseLaw, tick_s: f64, tick_most_s: f64) -> Law {
-    Law {
+fn real_law(law: &ResponseLaw, tick_s: f64, tick_most_s: f64) -> RealLaw {
+    RealLaw {
         droop: share(law.droop_gain_ppm_per_hz),
         setpoint_hz: micro(law.setpoint_uhz),
         slope: share(law.slope_gain_ppm_s_per_hz),

@@ -1,6 +1,6 @@
 //! The loop of the product's bidirectional spec, for tests.
 
-use super::fleet_loop::{Assumed, Law, LossProfile, PlantBand};
+use super::fleet_loop::{Assumed, LossProfile, PlantBand, RealLaw};
 use model::governor::Governor;
 use model::interval::Interval;
 use model::plant::Plant;
@@ -8,8 +8,8 @@ use model::plant::Plant;
 /// P \[GW\].
 const FLEET_GW: f64 = 1.4;
 
-pub(super) fn law() -> Law {
-    Law {
+pub(super) fn law() -> RealLaw {
+    RealLaw {
         droop: 6.0 / FLEET_GW,
         setpoint_hz: -0.05,
         slope: 2.0 / FLEET_GW,
