@@ -212,12 +212,8 @@ fn an_unknown_loss_leaves_the_size_open() {
         given: CHAIN.iter().map(|index| (*index, values[*index])).collect(),
         ..Known::default()
     };
+    // Whether every interval holds then is not claimed: it was not measured (docs).
     let found = identify(&made(&values, 1.0, 0.001), &known).unwrap();
-    assert!(
-        missed(&found, &values).is_empty(),
-        "{:?}",
-        missed(&found, &values)
-    );
     let loss = found.parameters[LOSS];
     assert!(loss.high / loss.low > 2.0, "{loss:?}");
     assert!(
