@@ -72,6 +72,31 @@ fn two_and_three_ranks_find_what_one_finds() {
     }
 }
 
+#[test]
+fn ranks_share_out_a_scorecard_and_a_sweep() {
+    let table = concat!(env!("CARGO_MANIFEST_DIR"), "/../firmware/tables/gb-bi.bin");
+    let scorecard = ["compare", "gb-bi", "--table", table, "--json"];
+    let short = ["--loss-gw", "1.0,1.3", "--inertia", "2.8,4"];
+    let few = ["--duration-s", "70", "--chargers", "6"];
+    let scorecard = [&scorecard[..], &short, &few].concat();
+    let sweep = ["budget", "paper-bi", "--sweep", "--json"];
+    let three = ["--widths", "3", "--periods", "1.5,2,3", "--errors", "0"];
+    let sweep = [&sweep[..], &three].concat();
+    for arguments in [scorecard, sweep] {
+        let alone = Command::new(PROGRAM).args(&arguments).output().unwrap();
+        assert!(alone.status.success() && alone.stdout.len() > 100);
+        for ranks in 2..=3 {
+            let together = mpirun(ranks).args(&arguments).output().unwrap();
+            assert!(together.status.success(), "{ranks} ranks");
+            assert_eq!(
+                String::from_utf8_lossy(&together.stdout),
+                String::from_utf8_lossy(&alone.stdout),
+                "{ranks} ranks"
+            );
+        }
+    }
+}
+
 /// Processes that a process has started and their own, as the system lists them.
 fn ranks_of(mpirun: &Child) -> Vec<u32> {
     let path = format!("/proc/{0}/task/{0}/children", mpirun.id());

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 
 use firmware::table::TableView;
 
+use super::shares::Job;
 use super::{Failure, OutputArgs, Overrides, output, progress, size_front};
 use lab::report::chart;
 use model::budget::Budget;
@@ -138,21 +139,29 @@ fn print(budget: &Budget) {
 }
 
 fn run_sweep(args: &BudgetArgs, spec: &Spec, options: &Options) -> Result<(), Failure> {
-    let mut outcomes = Vec::new();
+    let mut variants = Vec::new();
     for width_factor in &args.widths {
         for period_s in &args.periods {
             for participation in &args.errors {
-                let variant = sweep::Variant {
+                variants.push(sweep::Variant {
                     width_factor: *width_factor,
                     period_s: *period_s,
                     participation: *participation,
-                };
-                let outcome = sweep::try_variant(spec, variant, options, &progress::watch)
-                    .map_err(|error| Failure::No(error.to_string()))?;
-                outcomes.push(outcome);
+                });
             }
         }
     }
+    let job = Job::join();
+    let watch = |name| job.watch(name);
+    let answers = job.answers(&variants, |own| {
+        own.iter()
+            .map(|variant| sweep::try_variant(spec, *variant, options, &watch))
+            .collect::<Result<Vec<_>, _>>()
+            .map_err(|error| Failure::No(error.to_string()))
+    })?;
+    let Some(mut outcomes) = answers else {
+        return Ok(());
+    };
     sweep::mark_pareto(&mut outcomes);
     if let Some(path) = &args.svg {
         let picture = chart::svg(&size_front::figure(&outcomes)).map_err(Failure::bad)?;

@@ -8,6 +8,7 @@ use serde::Serialize;
 
 use super::band::{Band, Numbers};
 use super::files::write_all;
+use super::shares::Job;
 use super::{Failure, OutputArgs, SpecArgs, output, progress};
 use lab::compare::chargers::ChargersConfig;
 use lab::compare::verdict::Verdict;
@@ -92,11 +93,24 @@ pub(super) fn run(args: &CompareArgs) -> Result<(), Failure> {
     let spec = args.spec.load()?;
     let config = config(args, &spec)?;
     progress::catch_interrupts();
-    let bytes = pipeline::table_bytes(&spec, args.table.as_deref(), &progress::watch)?;
+    let job = Job::join();
+    let watch = |name| job.watch(name);
+    let bytes = pipeline::table_bytes(&spec, args.table.as_deref(), &watch)?;
     let table =
         TableView::parse(&bytes).map_err(|error| Failure::BadInput(format!("{error:?}")))?;
     let start = Instant::now();
-    let found = scorecard_of(&spec, &table, &config)?;
+    let by_loss = job.answers(&config.losses_gw, |own| {
+        let config = CompareConfig {
+            losses_gw: own.to_vec(),
+            ..config.clone()
+        };
+        let found = scorecard_of(&spec, &table, &config)?;
+        Ok(own.iter().map(|loss| found.of_loss(*loss)).collect())
+    })?;
+    let Some(by_loss) = by_loss else {
+        return Ok(());
+    };
+    let found = Scorecard::joined(&by_loss, config.inertias.len());
     let elapsed_s = start.elapsed().as_secs_f64();
     if let Some(path) = &args.csv {
         write_csv(path, &found)?;

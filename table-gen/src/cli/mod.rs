@@ -11,6 +11,8 @@ mod chances;
 mod checkpoint;
 mod compare;
 mod counterfactual;
+#[cfg(test)]
+mod documented;
 mod failure;
 mod falsify;
 mod files;
@@ -33,6 +35,7 @@ mod record;
 mod replay;
 mod report;
 mod run_tables;
+mod shares;
 mod simulate;
 mod size_front;
 mod synth;

@@ -5,7 +5,7 @@ use std::io;
 use std::path::{Path, PathBuf};
 
 use crate::process::Failure;
-use crate::steps::root;
+use crate::workspace::root;
 
 /// Most columns of a comment line; rustfmt does not break them.
 const COLUMNS_MAX: usize = 100;

@@ -12,6 +12,7 @@ mod python;
 mod steps;
 mod summary;
 mod tools;
+mod workspace;
 
 use std::fmt::Write as _;
 use std::process::ExitCode;

@@ -4,8 +4,8 @@
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use crate::process::{Failure, cargo, run};
-use crate::steps::root;
+use crate::process::{Failure, run};
+use crate::workspace::{program, root};
 
 /// What the environment gets from PyPI, each at a version that is known to do.
 const PACKAGES: &[&str] = &[
@@ -40,7 +40,7 @@ pub(crate) fn package() -> Result<(), Failure> {
     let wheels = fresh(&folder.join("wheels"))?;
     let messages = fresh(&folder.join("ocpp"))?;
     python("python3", &["-m", "venv", &text(&environment)])?;
-    let program = environment.join("bin/python");
+    let interpreter = environment.join("bin/python");
     let pip = [
         "-m",
         "pip",
@@ -48,7 +48,7 @@ pub(crate) fn package() -> Result<(), Failure> {
         "install",
         "--quiet",
     ];
-    python(&program, &[&pip[..], PACKAGES].concat())?;
+    python(&interpreter, &[&pip[..], PACKAGES].concat())?;
     let manifest = "table-gen/python/Cargo.toml";
     let build = ["build", "--release", "--manifest-path", manifest, "--out"];
     python(
@@ -63,12 +63,15 @@ pub(crate) fn package() -> Result<(), Failure> {
     ];
     let folder_of_wheels = text(&wheels);
     let wheel = [&pip[..], &found, &[&folder_of_wheels, "holdfast"]].concat();
-    python(&program, &wheel)?;
-    python(&program, &["table-gen/python/tests/test_package.py"])?;
-    python(&program, &["table-gen/python/examples/winning_counts.py"])?;
+    python(&interpreter, &wheel)?;
+    python(&interpreter, &["table-gen/python/tests/test_package.py"])?;
+    python(
+        &interpreter,
+        &["table-gen/python/examples/winning_counts.py"],
+    )?;
     let picture = text(&folder.join("winning-set.png"));
     python(
-        &program,
+        &interpreter,
         &["table-gen/python/examples/winning_set.py", &picture],
     )?;
 
@@ -77,16 +80,15 @@ pub(crate) fn package() -> Result<(), Failure> {
         path: key.clone(),
         source,
     })?;
-    let export =
-        "run --quiet --release -p table-gen -- ocpp export gb-bi --table firmware/tables/gb-bi.bin";
-    let mut command = Command::new(cargo());
+    let export = "ocpp export gb-bi --table firmware/tables/gb-bi.bin";
+    let mut command = program("table-gen")?;
     command
         .args(export.split_whitespace())
         .arg("--key")
         .arg(&key);
     run(command.arg("--out").arg(&messages).current_dir(root()))?;
     let check = "table-gen/ocpp/tests/published_schemas.py";
-    python(&program, &[check, &text(&messages)])
+    python(&interpreter, &[check, &text(&messages)])
 }
 
 /// An empty folder.

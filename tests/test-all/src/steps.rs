@@ -1,11 +1,11 @@
 //! The steps of `test-all`, in the order in which they run: what is cheap and likely to fail comes
 //! first.
 
-use std::path::PathBuf;
 use std::process::Command;
 use std::time::Duration;
 
 use crate::process::{self, Failure, Tests};
+use crate::workspace::{program, root};
 use crate::{comments, python, tools};
 
 /// One thing that must hold.
@@ -19,17 +19,20 @@ pub(crate) struct Step {
     action: Action,
 }
 
+#[derive(Clone, Copy)]
 enum Action {
     /// Arguments of one cargo command, separated by spaces, and what it needs in its environment.
     Cargo {
         arguments: &'static str,
         environment: &'static [(&'static str, &'static str)],
     },
+    /// A program of the workspace and its arguments, separated by spaces.
+    Program(&'static str),
     Call(fn() -> Result<(), Failure>),
 }
 
-/// Every step. To add one, add a line: `Step::cargo` for a cargo command, `Step::call` for a
-/// function. The number is its budget in seconds; together they stay within [`TOTAL_MAX`].
+/// Every step. To add one, add a line: `Step::cargo` for a cargo command, `Step::program` for a
+/// program of the workspace, `Step::call` for a function. The number is its budget in seconds; together they stay within [`TOTAL_MAX`].
 ///
 /// Everything on the host is built in the release profile: the tests play whole games (hundreds of
 /// thousands of cells, and closed loops over minutes of grid time), and so macros and build scripts
@@ -49,13 +52,14 @@ pub(crate) const STEPS: &[Step] = &[
     Step::cargo("docs", 30, "the documentation builds without warnings", "doc --workspace --no-deps --release").with(&[("RUSTDOCFLAGS", "-D warnings")]),
     Step::cargo("build-cores", 30, "the firmware library builds for Cortex-M4F (the reference board), Cortex-M0+ and RV32IMC (no FPU)", "build -p firmware --lib --profile firmware --target thumbv7em-none-eabihf --target thumbv6m-none-eabi --target riscv32imc-unknown-none-elf"),
     Step::cargo("host-tests", 480, "unit, property, documentation and cross-crate tests", "test --workspace --release"),
-    Step::call("python", 110, "the Python package builds, installs and gives the paper's counts; OCPP's messages fit the published schemas", python::package),
-    Step::cargo("images", 120, "the images link, every build of the product too; ELF, BIN and HEX are written", "fw images"),
-    Step::cargo("pil", 90, "the emulated processor and the host act alike, to the bit", "fw pil"),
-    Step::cargo("pil-m0", 60, "code for Cortex-M0+, with floating point in software, acts alike to the bit", "fw pil --core m0 --scenarios 200"),
-    Step::cargo("pil-riscv", 60, "RV32IMC, with floating point in software, acts alike to the bit", "fw pil --core riscv --scenarios 200"),
-    Step::cargo("c-api", 45, "bare C on emulated Cortex-M and the host act alike to the bit; size, stack and instructions are as committed; CMake builds with the package", "fw c-api"),
-    Step::cargo("costs", 60, "flash, RAM, stack and instructions are within their goals and as committed", "fw costs"),
+    Step::cargo("ranks", 60, "games, scorecards and sweeps on two and three ranks of an MPI job are those of one process, to the bit", "test --workspace --release --features table-gen/mpi --test ranks"),
+    Step::call("python", 70, "the Python package builds, installs and gives the paper's counts; OCPP's messages fit the published schemas", python::package),
+    Step::program("images", 120, "the images link, every build of the product too; ELF, BIN and HEX are written", "fw images"),
+    Step::program("pil", 90, "the emulated processor and the host act alike, to the bit", "fw pil"),
+    Step::program("pil-m0", 60, "code for Cortex-M0+, with floating point in software, acts alike to the bit", "fw pil --core m0 --scenarios 200"),
+    Step::program("pil-riscv", 60, "RV32IMC, with floating point in software, acts alike to the bit", "fw pil --core riscv --scenarios 200"),
+    Step::program("c-api", 45, "bare C on emulated Cortex-M and the host act alike to the bit; size, stack and instructions are as committed; CMake builds with the package", "fw c-api"),
+    Step::program("costs", 60, "flash, RAM, stack and instructions are within their goals and as committed", "fw costs"),
 ];
 
 /// Time that the whole run may take on two quiet cores.
@@ -93,6 +97,21 @@ impl Step {
         }
     }
 
+    const fn program(
+        name: &'static str,
+        budget_s: u64,
+        about: &'static str,
+        command: &'static str,
+    ) -> Self {
+        let action = Action::Program(command);
+        Self {
+            name,
+            budget_s,
+            about,
+            action,
+        }
+    }
+
     const fn call(
         name: &'static str,
         budget_s: u64,
@@ -110,12 +129,12 @@ impl Step {
 
     /// The same step with these variables in its environment; a step that is a function has none.
     const fn with(self, environment: &'static [(&'static str, &'static str)]) -> Self {
-        let action = match self.action {
+        let action = match &self.action {
             Action::Cargo { arguments, .. } => Action::Cargo {
-                arguments,
+                arguments: *arguments,
                 environment,
             },
-            Action::Call(function) => Action::Call(function),
+            other => *other,
         };
         Self { action, ..self }
     }
@@ -129,6 +148,11 @@ impl Step {
     pub(crate) fn run(&self) -> Result<Tests, Failure> {
         match &self.action {
             Action::Call(function) => function().map(|()| Tests::default()),
+            Action::Program(command) => {
+                let mut words = command.split_whitespace();
+                let name = words.next().unwrap_or_default();
+                process::run(program(name)?.args(words).current_dir(root()))
+            }
             Action::Cargo {
                 arguments,
                 environment,
@@ -140,17 +164,6 @@ impl Step {
             ),
         }
     }
-}
-
-/// The workspace's root: two folders above this package. `cargo run` says where the package is now;
-/// a binary started by hand only knows where it was built.
-pub(crate) fn root() -> PathBuf {
-    let package = std::env::var_os("CARGO_MANIFEST_DIR")
-        .map_or_else(|| env!("CARGO_MANIFEST_DIR").into(), PathBuf::from);
-    package
-        .ancestors()
-        .nth(2)
-        .map_or_else(|| package.clone(), PathBuf::from)
 }
 
 #[cfg(test)]
@@ -182,10 +195,5 @@ mod tests {
             targets.extend(named.map(|pair| pair[1]));
         }
         assert_eq!(targets, HashSet::from_iter(tools::TARGETS.iter().copied()));
-    }
-
-    #[test]
-    fn the_root_holds_this_package() {
-        assert!(root().join("tests/test-all/Cargo.toml").is_file());
     }
 }

@@ -21,7 +21,7 @@ pub mod verdict;
 
 use firmware::table::TableView;
 use rayon::prelude::*;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use chargers::{ChargersConfig, Kind};
 use course::Course;
@@ -41,7 +41,7 @@ pub const TRIGGER_HZ: f64 = -0.1;
 pub const DURATION_S: f64 = 300.0;
 
 /// Who controls the chargers.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Controller {
     /// Nobody: the chargers do not respond.
@@ -99,7 +99,7 @@ impl CompareConfig {
 }
 
 /// One run.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Row {
     /// Lost infeed \[GW\].
     pub loss_gw: f64,
@@ -117,6 +117,27 @@ pub struct Row {
 pub struct Scorecard {
     /// The runs.
     pub rows: Vec<Row>,
+}
+
+impl Scorecard {
+    /// The runs of one loss: by inertia, then controller.
+    pub fn of_loss(&self, loss_gw: f64) -> Vec<Row> {
+        let rows = self.rows.iter().filter(|row| row.loss_gw == loss_gw);
+        rows.cloned().collect()
+    }
+
+    /// The scorecard of all these losses, each with the runs of so many inertias.
+    pub fn joined(by_loss: &[Vec<Row>], inertias: usize) -> Self {
+        let of = |at: usize| {
+            let runs = by_loss
+                .iter()
+                .map(|rows| rows.chunks(Controller::ALL.len()));
+            runs.filter_map(move |mut runs| runs.nth(at)).flatten()
+        };
+        Self {
+            rows: (0..inertias).flat_map(of).cloned().collect(),
+        }
+    }
 }
 
 /// Why there is no scorecard.
@@ -186,4 +207,42 @@ fn run(
     let chargers = chargers::Chargers::new(&kind, &config.chargers, tick_ms)
         .map_err(CompareError::Observer)?;
     Ok(course().with(chargers))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn losses_taken_apart_join_into_the_same_scorecard() {
+        let outcome = |at: f64| Outcome {
+            nadir_hz: at,
+            nadir_time_s: 0.0,
+            final_hz: 50.0,
+            seconds_below_49_5: 0.0,
+            participation_gw_s: 0.0,
+            changes_per_charger: 0.0,
+            changes_most: 0,
+            ripple_hz: 0.0,
+        };
+        // One inertia twice, as a person may ask.
+        let (inertias, losses) = ([2.0, 4.0, 4.0], [0.3, 0.4]);
+        let mut rows = Vec::new();
+        for inertia in inertias {
+            for loss in losses {
+                for controller in Controller::ALL {
+                    rows.push(Row {
+                        loss_gw: loss,
+                        inertia_gw_s_per_hz: inertia,
+                        controller,
+                        outcome: outcome(rows.len() as f64),
+                    });
+                }
+            }
+        }
+        let whole = Scorecard { rows };
+        let apart = losses.map(|loss| whole.of_loss(loss));
+        assert_eq!(apart[0].len(), inertias.len() * Controller::ALL.len());
+        assert_eq!(Scorecard::joined(&apart, inertias.len()), whole);
+    }
 }

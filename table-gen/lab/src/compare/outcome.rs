@@ -1,9 +1,9 @@
 //! What a run of the scorecard is judged by.
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 /// What a run is judged by.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Outcome {
     /// Lowest frequency \[Hz, absolute\].
     pub nadir_hz: f64,

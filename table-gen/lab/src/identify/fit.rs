@@ -7,7 +7,7 @@
 use std::cell::{Cell, RefCell};
 
 use levenberg_marquardt::{LeastSquaresProblem, LevenbergMarquardt};
-use nalgebra_lm::{DMatrix, DVector, Dyn, Owned};
+use nalgebra::{DMatrix, DVector, Dyn, Owned};
 
 use super::course::{Stage, deviations};
 use super::parameters::{COUNT, Parameter, Values};

@@ -1,7 +1,7 @@
 //! Guarantee against bytes: variants of a spec, each synthesised and compressed, and which of them
 //! nothing beats.
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use crate::compress::{CompressError, Options};
 use crate::game::{GameError, Watch};
@@ -10,7 +10,7 @@ use crate::synthesis::{self, SynthesisError};
 use model::spec::Spec;
 
 /// A variant of a spec.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Variant {
     /// Factor on every cell width.
     pub width_factor: f64,
@@ -21,7 +21,7 @@ pub struct Variant {
 }
 
 /// How a variant came out.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Outcome {
     /// The variant.
     #[serde(flatten)]

@@ -11,6 +11,7 @@
 //! How bits travel is a [`Transport`]: [`threads`] for tests in one process; the package
 //! `mpi-ranks` has the one for many machines.
 
+pub mod shares;
 pub mod slab;
 pub mod threads;
 
