@@ -7,10 +7,14 @@
 use std::path::{Path, PathBuf};
 use std::{env, fs, io};
 
-/// The tables that `holdfast` carries unless `HOLDFAST_TABLE` names another, from the workspace's
-/// root: of a charger that can only stop charging, and of one that can feed the grid.
-const TABLE_UNIDIRECTIONAL: &str = "firmware/tables/gb-uni.bin";
-const TABLE_BIDIRECTIONAL: &str = "firmware/tables/gb-bi.bin";
+/// The table that `holdfast` carries unless `HOLDFAST_TABLE` names another, from the workspace's
+/// root: for its direction, and for its meter.
+fn shipped_table() -> String {
+    let has = |feature: &str| env::var_os(format!("CARGO_FEATURE_{feature}")).is_some();
+    let direction = if has("BIDIRECTIONAL") { "bi" } else { "uni" };
+    let chip = if has("ADE7953") { "-ade7953" } else { "" };
+    format!("firmware/tables/gb-{direction}{chip}.bin")
+}
 
 /// Boards and their memory maps, from the package's folder.
 const BOARDS: &str = "images/boards";
@@ -80,12 +84,8 @@ fn board(package: &Path) -> io::Result<String> {
 /// charger then starts with the droop until a table is flashed.
 fn table(root: &Path, out: &Path) -> io::Result<()> {
     let named = env::var_os("HOLDFAST_TABLE");
-    let default = if env::var_os("CARGO_FEATURE_BIDIRECTIONAL").is_some() {
-        TABLE_BIDIRECTIONAL
-    } else {
-        TABLE_UNIDIRECTIONAL
-    };
-    let path = root.join(named.clone().unwrap_or_else(|| default.into()));
+    let default = shipped_table();
+    let path = root.join(named.clone().unwrap_or_else(|| default.clone().into()));
     println!("cargo::rerun-if-changed={}", path.display());
     let bytes = if named.is_none() && !path.exists() {
         println!(
