@@ -38,6 +38,20 @@ fn ignores_glitches_and_restarts_after_a_gap() {
 }
 
 #[test]
+fn a_mains_that_goes_is_no_signal() {
+    let mut source = source();
+    let start = u32::MAX - 60;
+    for k in 0..=5 {
+        source.capture(20_000 * k, start.wrapping_add(20 * k));
+    }
+    let at = |source: &mut ZeroCrossing, ms: u32| source.read(start.wrapping_add(100 + ms));
+    assert_eq!(at(&mut source, 1_000).map(|r| r.age_ms), Ok(1_000));
+    for ms in [1_001, 65_536, 1 << 30] {
+        assert_eq!(at(&mut source, ms), Err(FrequencyError::NoSignal));
+    }
+}
+
+#[test]
 fn error_and_lag_are_those_of_the_tradeoffs() {
     let source = ZeroCrossing::new(1_000_000, 5, 20).expect("in range");
     // A tick 500 µHz, jitter of 1 µs at either end 1 mHz, 20 ppm 1 mHz; each quotient rounded
