@@ -14,7 +14,7 @@ use core::num::NonZeroU16;
 use crate::charger::{Charger, ChargerConfig, Installation, MeterFacts, Misfits, Report, Watchdog};
 use crate::dispatch::bidirectional::power_w;
 use crate::dispatch::fleet::Threshold;
-use crate::dispatch::unidirectional::current_ma;
+use crate::dispatch::unidirectional::Floor;
 use crate::dispatch::{Dispatch, DispatchError, SetPoint};
 use crate::fault::ResetCause;
 use crate::frequency::{FrequencyError, FrequencySource, Reading};
@@ -145,7 +145,7 @@ impl FrequencySource for ToldMeter {
 struct Limiter {
     direction: Direction,
     connection: Connection,
-    threshold: Threshold,
+    floor: Floor,
     car_present: bool,
     limit_ma: u32,
     charge_w: u32,
@@ -176,7 +176,7 @@ impl Dispatch for Limiter {
         }
         match self.direction {
             Direction::Unidirectional => {
-                let ma = current_ma(participation, self.limit_ma, self.threshold);
+                let ma = self.floor.current_ma(participation, self.limit_ma);
                 self.allowed = Allowance {
                     // At most 80 A, 1 kV and three phases: 240 kW.
                     power_w: self.connection.power_w(ma).cast_signed(),
@@ -250,7 +250,7 @@ impl<'t> LimitProvider<'t> {
         let limiter = Limiter {
             direction: config.installation.direction,
             connection: config.connection,
-            threshold: Threshold::of_serial(config.serial),
+            floor: Floor::new(Threshold::of_serial(config.serial)),
             car_present: false,
             limit_ma: 0,
             charge_w: 0,

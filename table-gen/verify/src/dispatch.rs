@@ -6,7 +6,7 @@
 //! | what | where it is counted |
 //! |---|---|
 //! | dead time, ramp, wait of the pilot | in the delay of the header, [`Spec::command_delay_s`] |
-//! | the floor of 6 A | nowhere: chargers pause or draw 6 A by serial, so that the mean is right |
+//! | the floor of 6 A | chargers pause or draw 6 A by serial, so that the mean is right but for their own hysteresis: too much, `RESUME_MA` of the rating, from `1 - (6 A + RESUME_MA) / rating` on |
 //! | a paused car waits for 6 A and more | too much: `1 - u`, from `1 - (6 A + wait) / rating` on |
 //! | a car draws less than its charger's rating | too little: `min(u, 1 - draw)` |
 //! | a share of cars pauses by itself | too much: `share (1 - u)` |
@@ -16,6 +16,7 @@
 //! `participation u + participation_absolute`. All are straight lines in u between the places where
 //! they begin, so the worst place is one of those.
 
+use firmware::dispatch::unidirectional::RESUME_MA;
 use model::spec::{ChargerSpec, Direction, Spec};
 use model::verdict::{Claim, ClaimName};
 
@@ -85,37 +86,52 @@ fn worst(spec: &Spec) -> Worst {
     let resume = 1.0 - (FLOOR_A + charger.resume_above_floor_a) / rating_a;
     let missing = if pilot { 1.0 - charger.draw[0] } else { 0.0 };
     let waits = pilot && charger.resume_above_floor_a > 0.0;
-    [0.0, missing, resume.clamp(0.0, 1.0), 1.0]
-        .into_iter()
-        .flat_map(|command: f64| {
-            let allowed = uncertainty.participation * command + uncertainty.participation_absolute;
-            let at = |error: f64, what: String| Worst {
-                error,
-                allowed,
-                command,
-                what,
-            };
-            let waiting = if waits && command >= resume {
-                1.0 - command
-            } else {
-                0.0
-            };
-            let pausing = charger.pausing_share * (1.0 - command);
-            [
-                at(command.min(missing), too_little(charger)),
-                at(
-                    (waiting + pausing).min(1.0 - command),
-                    too_much(charger, waits),
-                ),
-            ]
-        })
-        .max_by(|a, b| (a.error - a.allowed).total_cmp(&(b.error - b.allowed)))
-        .unwrap_or(Worst {
-            error: 0.0,
-            allowed: 0.0,
-            command: 0.0,
-            what: String::new(),
-        })
+    // The charger's own hysteresis: at most so many of the chargers whose threshold lies within the
+    // margin pause though they should draw 6 A, or so much of the current is not drawn.
+    let margin_a = f64::from(RESUME_MA) * 1e-3;
+    let own = 1.0 - (FLOOR_A + margin_a) / rating_a;
+    [
+        0.0,
+        missing,
+        resume.clamp(0.0, 1.0),
+        own.clamp(0.0, 1.0),
+        1.0,
+    ]
+    .into_iter()
+    .flat_map(|command: f64| {
+        let allowed = uncertainty.participation * command + uncertainty.participation_absolute;
+        let at = |error: f64, what: String| Worst {
+            error,
+            allowed,
+            command,
+            what,
+        };
+        let waiting = if waits && command >= resume {
+            1.0 - command
+        } else {
+            0.0
+        };
+        let pausing = charger.pausing_share * (1.0 - command);
+        let own = if pilot && command >= own {
+            margin_a / rating_a
+        } else {
+            0.0
+        };
+        [
+            at(command.min(missing), too_little(charger)),
+            at(
+                (waiting + pausing + own).min(1.0 - command),
+                too_much(charger, waits),
+            ),
+        ]
+    })
+    .max_by(|a, b| (a.error - a.allowed).total_cmp(&(b.error - b.allowed)))
+    .unwrap_or(Worst {
+        error: 0.0,
+        allowed: 0.0,
+        command: 0.0,
+        what: String::new(),
+    })
 }
 
 fn too_little(charger: &ChargerSpec) -> String {
