@@ -7,7 +7,6 @@
 
 #[cfg(feature = "log")]
 use defmt_rtt as _;
-use panic_halt as _;
 
 use cortex_m_rt::entry;
 use firmware::board::{Parts, Runner};
@@ -53,7 +52,8 @@ fn charge() -> Option<()> {
     let table = flash::image(table_region::bytes());
     let config = ChargerConfig {
         level_offset: LevelOffset::of_serial(started.serial),
-        start_delay: StartDelay::street(started.serial),
+        start_delay: StartDelay::street(started.serial).after_starts(started.starts),
+        standing_faults: started.faults,
         installation: Some(output::INSTALLATION),
         ..ChargerConfig::DEFAULT
     };

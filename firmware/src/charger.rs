@@ -17,7 +17,8 @@
 //!
 //! ## Energy
 //! Nothing is energised before a frequency has been believed and the delay of [`StartDelay`] has
-//! passed, nor after the mains has gone, until the same has happened again.
+//! passed, nor after the mains has gone, until the same has happened again. Without its crystal a
+//! charger believes no frequency ([`ChargerConfig::standing_faults`]): it energises nothing.
 //!
 //! ## Trust
 //! After a start nobody knows the governor chain: the grid may be in the middle of an event. The
@@ -232,9 +233,13 @@ impl<'t, S: FrequencySource, D: Dispatch, W: Watchdog> Charger<'t, S, D, W> {
 
     /// One tick.
     pub fn tick(&mut self, now_ms: u32) -> Report {
-        let mut faults = Faults::NONE;
+        let mut faults = self.config.standing_faults;
         let due = self.ticks_due(now_ms, &mut faults);
-        let reading = self.source.read(now_ms);
+        let reading = if faults.contains(Faults::CLOCK) {
+            Err(FrequencyError::Clock)
+        } else {
+            self.source.read(now_ms)
+        };
         match self.gate.admit(reading) {
             Ok(f_uhz) => {
                 self.start.seen(f_uhz, now_ms);

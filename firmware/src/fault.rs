@@ -35,9 +35,14 @@ impl Faults {
     pub const DISPATCH: Self = Self(1 << 11);
     /// The charger is not what the proof of its table assumed.
     pub const MISFIT: Self = Self(1 << 12);
+    /// The crystal does not run. The controller goes by its internal oscillator, and believes no
+    /// frequency.
+    pub const CLOCK: Self = Self(1 << 13);
+    /// The last run was stopped by a panic, a hard fault or a crystal that failed.
+    pub const STOPPED: Self = Self(1 << 14);
 
     /// Every fault with its name, in the order of the bits.
-    pub const NAMES: [(Self, &'static str); 13] = [
+    pub const NAMES: [(Self, &'static str); 15] = [
         (Self::BUS, "bus"),
         (Self::NO_SIGNAL, "no-signal"),
         (Self::STALE, "stale"),
@@ -51,6 +56,8 @@ impl Faults {
         (Self::RESTARTED, "restarted"),
         (Self::DISPATCH, "dispatch"),
         (Self::MISFIT, "misfit"),
+        (Self::CLOCK, "clock"),
+        (Self::STOPPED, "stopped"),
     ];
 
     /// The bits, as telemetry carries them.
@@ -84,6 +91,7 @@ impl From<FrequencyError> for Faults {
     fn from(error: FrequencyError) -> Self {
         match error {
             FrequencyError::Bus => Self::BUS,
+            FrequencyError::Clock => Self::CLOCK,
             FrequencyError::NoSignal => Self::NO_SIGNAL,
             FrequencyError::Stale { .. } => Self::STALE,
             FrequencyError::Stuck { .. } => Self::STUCK,

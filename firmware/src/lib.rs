@@ -21,6 +21,7 @@
 //! | [`board`] | a board's time and lines | the loop that ticks the charger |
 //! | [`telemetry`] | a tick's report | a frame on a serial line |
 //! | [`flash`] | a flash region | the table's bytes |
+//! | [`retained`] | how the last run ended | a word that a reset leaves alone |
 //! | [`link`] | requests of a host | the answers of a charger: processor in the loop |
 //!
 //! Nothing here allocates, recurses or panics; nothing is `unsafe`. Everything that decides is
@@ -90,6 +91,8 @@ pub mod board;
 pub mod telemetry;
 
 pub mod flash;
+
+pub mod retained;
 
 pub mod link;
 

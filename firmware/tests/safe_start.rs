@@ -202,3 +202,41 @@ fn neighbours_return_at_different_moments() {
     // Of 50 draws from 6 000 ticks, more than 5 pairs that agree have a probability below 1e-6.
     assert!(ticks.len() >= 45, "{}", ticks.len());
 }
+
+/// The frames' faults and whether anything was energised, over 200 s of healthy mains.
+fn with_standing(standing_faults: Faults) -> (Vec<Faults>, bool, Mode) {
+    let energised = Rc::new(Cell::new(false));
+    let config = ChargerConfig {
+        standing_faults,
+        ..ChargerConfig::DEFAULT
+    };
+    let source = Switched(Rc::new(Cell::new(true)));
+    let dispatch = Noted(energised.clone());
+    let mut charger = Charger::new(source, dispatch, NoDog, &[], config, ResetCause::Watchdog);
+    let mut ever = false;
+    let mut faults = Vec::new();
+    let mut mode = Mode::WarmUp;
+    for tick in 0..2_000 {
+        let report = charger.tick(tick * TICK_MS);
+        ever |= energised.get();
+        faults.push(report.faults);
+        mode = report.mode;
+    }
+    (faults, ever, mode)
+}
+
+#[test]
+fn without_its_crystal_a_charger_believes_no_frequency_and_energises_nothing() {
+    let (faults, energised, mode) = with_standing(Faults::CLOCK);
+    assert!(!energised);
+    assert!(faults.iter().all(|found| found.contains(Faults::CLOCK)));
+    assert_eq!(mode, Mode::Safe);
+}
+
+#[test]
+fn a_run_that_was_stopped_is_told_in_the_next_and_changes_nothing_else() {
+    let (faults, energised, mode) = with_standing(Faults::STOPPED);
+    assert!(energised);
+    assert!(faults.iter().all(|found| found.contains(Faults::STOPPED)));
+    assert_eq!(mode, Mode::DroopNoTable);
+}

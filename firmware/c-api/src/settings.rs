@@ -4,7 +4,7 @@ use core::num::NonZeroU16;
 
 use firmware::charger::{ChargerConfig, Installation, MeterFacts, StartDelay};
 use firmware::event::EventEnd;
-use firmware::fault::ResetCause;
+use firmware::fault::{Faults, ResetCause};
 use firmware::frequency::filter::FILTER_TICKS_MAX;
 use firmware::frequency::gate::GateLimits;
 use firmware::frequency::{FrequencyError, Reading};
@@ -126,6 +126,7 @@ pub fn checked(config: &Config) -> Result<(ProviderConfig, ResetCause), Status> 
             random_s: config.start_random_s,
             seed: config.serial,
         },
+        standing_faults: Faults::NONE,
     };
     let provider = ProviderConfig {
         installation: Installation {

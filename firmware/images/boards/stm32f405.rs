@@ -14,18 +14,24 @@
 //! The timer captures a crossing in hardware. The watchdog bites after four ticks without a
 //! completed one, and a panic ends in it too.
 
+#[path = "stm32f405/clock.rs"]
+mod clock;
+#[path = "stm32f405/ending.rs"]
+mod ending;
+
 use embedded_hal::spi::{ErrorType, MODE_3, Operation, SpiDevice};
 use embedded_hal_nb::serial::Write as _;
 use firmware::board::{Board, Hardware, Rest};
 use firmware::charger::{Watchdog, reference};
 use firmware::dispatch::car::{CarSense, CarState};
 use firmware::dispatch::pilot::PILOT_HZ;
-use firmware::fault::ResetCause;
+use firmware::fault::{Faults, ResetCause};
 use firmware::frequency::zero_crossing::Captures;
+use firmware::retained::{self, Ending};
 use stm32f4xx_hal::gpio::{Output, PA0, PA1, PA4, PA5, PA6, PA7, PA8, PB0};
 use stm32f4xx_hal::pac::{self, ADC_COMMON, ADC1, SPI1, TIM1, TIM2, TIM5, USART2};
 use stm32f4xx_hal::prelude::*;
-use stm32f4xx_hal::rcc::{Config, Rcc};
+use stm32f4xx_hal::rcc::Rcc;
 use stm32f4xx_hal::serial::config::Config as SerialConfig;
 use stm32f4xx_hal::serial::{Serial, Tx};
 use stm32f4xx_hal::signature::Uid;
@@ -34,16 +40,12 @@ use stm32f4xx_hal::timer::capture::{CaptureChannel, CaptureHzManager};
 use stm32f4xx_hal::timer::{CaptureFilter, CapturePolarity, CounterUs, Flag, PwmChannel, Timer};
 use stm32f4xx_hal::watchdog::IndependentWatchdog;
 
-/// Crystal of the board \[MHz\].
-const CRYSTAL_MHZ: u32 = 25;
 /// Core and timer clock \[MHz\].
-const CORE_MHZ: u32 = 84;
+const CORE_MHZ: u32 = clock::CORE_MHZ;
 /// Timer of the captures \[Hz\]: the whole timer clock, so that its tick is worth 6 µHz.
 const CAPTURE_HZ: u32 = CORE_MHZ * 1_000_000;
 // The products' tables are chosen for these captures.
 const _: () = assert!(CAPTURE_HZ == reference::TIMER_HZ);
-/// Turns for which the crystal is waited for.
-const CRYSTAL_TURNS: u32 = 400_000;
 /// Conversions of the pilot: 68 cycles of 21 MHz each, so 1.04 ms, more than a period.
 const PILOT_SAMPLES: u32 = 320;
 /// Turns that a conversion is waited for; it takes 270 cycles of the core.
@@ -76,15 +78,12 @@ pub(crate) struct Started {
     pub(crate) watchdog: Dog,
     /// Why the controller started.
     pub(crate) cause: ResetCause,
+    /// What is wrong with the board in this run.
+    pub(crate) faults: Faults,
+    /// Starts before this one since the supply came; wraps.
+    pub(crate) starts: u8,
     /// A number of this chip, for its place in the fleet.
     pub(crate) serial: u32,
-}
-
-/// Starts the crystal; whether it runs. Waited for is many times what a crystal takes (2 ms).
-fn crystal_runs(rcc: &pac::RCC) -> bool {
-    rcc.cr().modify(|_, w| w.hseon().on());
-    // A turn takes some cycles of the 16 MHz of the internal oscillator: 100 ms or more.
-    (0..CRYSTAL_TURNS).any(|_| rcc.cr().read().hserdy().is_ready())
 }
 
 /// Starts watchdog, clocks, time and telemetry. `None` if one of them does not start, or a second
@@ -95,16 +94,16 @@ pub(crate) fn start() -> Option<Started> {
     let mut watchdog = IndependentWatchdog::new(peripherals.IWDG);
     watchdog.start(WATCHDOG_MS.millis());
     let cause = reset_cause(&peripherals.RCC);
-    if !crystal_runs(&peripherals.RCC) {
-        return None;
+    let mut kept = ending::Backup::open(&peripherals.RCC, &peripherals.PWR);
+    let last = retained::start(&mut kept);
+    let mut faults = Faults::NONE;
+    if last.ending != Ending::Unnoted {
+        faults.insert(Faults::STOPPED);
     }
-    // One configuration, known when this is compiled: with two, the clock tree is worked out at run
-    // time, in 2 KB of code that can panic.
-    let clocks = Config::hse(CRYSTAL_MHZ.MHz()).sysclk(CORE_MHZ.MHz());
-    let mut rcc = peripherals.RCC.freeze(clocks);
-    // If the crystal dies later, the core gets an interrupt that cannot be masked. Its handler
-    // loops, and the watchdog restarts the board.
-    rcc.cr().modify(|_, w| w.csson().on());
+    let mut rcc = clock::internal(peripherals.RCC);
+    if clock::to_crystal(&rcc)? == clock::Oscillator::Internal {
+        faults.insert(Faults::CLOCK);
+    }
     let port_a = peripherals.GPIOA.split(&mut rcc);
     let port_b = peripherals.GPIOB.split(&mut rcc);
     let baud = SerialConfig::default().baudrate(BAUD.bps());
@@ -130,6 +129,8 @@ pub(crate) fn start() -> Option<Started> {
         board: Lines { timer, line },
         watchdog: Dog(watchdog),
         cause,
+        faults,
+        starts: last.starts,
         serial: serial_number(),
     })
 }

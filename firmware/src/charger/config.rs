@@ -3,6 +3,7 @@
 use super::fit::Installation;
 use super::start::StartDelay;
 use crate::event::EventEnd;
+use crate::fault::Faults;
 use crate::frequency::gate::GateLimits;
 use crate::response::LevelOffset;
 use crate::table::PlantParameters;
@@ -50,11 +51,14 @@ pub struct ChargerConfig {
     pub event_end: EventEnd,
     /// How long nothing is energised after a start, once the mains has been seen.
     pub start_delay: StartDelay,
+    /// What is wrong from the start to the end of this run. With [`Faults::CLOCK`] among it no
+    /// frequency is believed.
+    pub standing_faults: Faults,
 }
 
 impl ChargerConfig {
     /// No filter, 1 s of hold at 100 ms a tick, release over 60 s, warm-up by the plant, levels as
-    /// they are, nothing compared, [`EventEnd::DEFAULT`], no delay at the start.
+    /// they are, nothing compared, [`EventEnd::DEFAULT`], no delay at the start, nothing wrong.
     pub const DEFAULT: Self = Self {
         gate: GateLimits::DEFAULT,
         filter_ticks: 1,
@@ -65,5 +69,6 @@ impl ChargerConfig {
         installation: None,
         event_end: EventEnd::DEFAULT,
         start_delay: StartDelay::NONE,
+        standing_faults: Faults::NONE,
     };
 }

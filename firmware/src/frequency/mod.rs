@@ -56,6 +56,8 @@ pub struct Reading {
 pub enum FrequencyError {
     /// The metering chip did not answer: check wiring and supply.
     Bus,
+    /// The controller runs on a clock that its error is not stated for: check the crystal.
+    Clock,
     /// No complete measurement yet, or the mains is not there.
     NoSignal,
     /// The last measurement is too old.

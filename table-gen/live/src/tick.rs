@@ -18,6 +18,7 @@ const HYPOTHESES: [(&str, &[Faults]); 5] = [
             Faults::STUCK,
             Faults::OUT_OF_RANGE,
             Faults::IMPLAUSIBLE,
+            Faults::CLOCK,
         ],
     ),
     (
@@ -26,7 +27,12 @@ const HYPOTHESES: [(&str, &[Faults]); 5] = [
     ),
     (
         "ticks on time, estimate trusted",
-        &[Faults::OVERRUN, Faults::CLOCK_JUMP, Faults::RESTARTED],
+        &[
+            Faults::OVERRUN,
+            Faults::CLOCK_JUMP,
+            Faults::RESTARTED,
+            Faults::STOPPED,
+        ],
     ),
     ("set-point taken by the hardware", &[Faults::DISPATCH]),
     (
