@@ -6,9 +6,11 @@
 //! | [`table_fit`] | which table goes into which image, and what is proven of it |
 //! | [`pil`] | processor in the loop: QEMU, the lock-step link, scenarios, the host beside it |
 //! | [`c_api`] | the C interface: libraries, the C program in QEMU, costs, the CMake package |
+//! | [`board`] | the unmodified images on an emulated board, and the same runs on the host |
 //! | [`costs`] | flash, RAM, stack and instructions, compared with what is committed |
 #![forbid(unsafe_code)]
 
+pub mod board;
 pub mod c_api;
 pub mod costs;
 pub mod images;

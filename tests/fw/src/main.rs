@@ -12,6 +12,7 @@ use firmware::link::session::{Session, Wires};
 use firmware::link::{Request, Setup, SourceKind};
 use firmware::table::TableView;
 
+use fw::board::{self, BoardError};
 use fw::c_api::program::{CORTEX_M0, CORTEX_M4};
 use fw::c_api::{self, CApiError};
 use fw::costs::{self, CostError};
@@ -96,6 +97,15 @@ enum Command {
         #[arg(long)]
         bless: bool,
     },
+    /// The unmodified images on an emulated board: scenarios that each state what must hold, and the
+    /// host on the same captures, equal to the bit
+    Board {
+        /// Scenarios [default: all but those that take minutes]
+        scenarios: Vec<String>,
+        /// Folder of images built before, NAME.elf, in place of what is built now
+        #[arg(long, value_name = "FOLDER")]
+        images: Option<PathBuf>,
+    },
     /// Measure flash, RAM, stack and instructions, and compare with firmware/expected
     Costs {
         /// Take the figures over
@@ -162,6 +172,9 @@ fn main() -> ExitCode {
             out,
             bless,
         } => c_interface((scenarios, ticks.max(1)), &root().join(out), bless),
+        Command::Board { scenarios, images } => {
+            board::play(&scenarios, images).map_err(AnyError::from)
+        }
         Command::Costs { bless } => measure(bless),
     };
     match result {
@@ -171,7 +184,12 @@ fn main() -> ExitCode {
             let wrong = matches!(error.downcast_ref(), Some(CostError::Wrong(_)));
             let differs = matches!(error.downcast_ref(), Some(qemu::PilError::Differs(_)));
             let in_c = matches!(error.downcast_ref(), Some(CApiError::Differs(_)));
-            ExitCode::from(if wrong || differs || in_c { 1 } else { 2 })
+            let on_board = matches!(
+                error.downcast_ref(),
+                Some(BoardError::Fails | BoardError::Differs { .. })
+            );
+            let no = wrong || differs || in_c || on_board;
+            ExitCode::from(if no { 1 } else { 2 })
         }
     }
 }
