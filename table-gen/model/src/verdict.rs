@@ -98,6 +98,8 @@ pub enum ClaimName {
     Image,
     /// The droop alone keeps f above 49.2 Hz.
     Fallback,
+    /// A charger's command changes seldom.
+    Quiet,
 }
 
 impl ClaimName {
@@ -116,6 +118,7 @@ impl ClaimName {
             Self::Dispatch => "dispatch",
             Self::Image => "image",
             Self::Fallback => "fallback",
+            Self::Quiet => "quiet",
         }
     }
 }

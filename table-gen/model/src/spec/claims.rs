@@ -157,6 +157,12 @@ pub struct RequirementsSpec {
     /// Unit: s. Allowed: a number above 0 to 86400, or none. Default: none.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub horizon_s: Option<f64>,
+    /// Most changes of a charger's command, of 5 % of full scale and more, in any 300 s; absent: no
+    /// such claim.
+    ///
+    /// Unit: 1. Allowed: a number from 0 to 1000000, or none. Default: none.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub changes_per_300_s: Option<f64>,
 }
 
 impl Default for RequirementsSpec {
@@ -169,6 +175,7 @@ impl Default for RequirementsSpec {
             settle_within_s: 60.0,
             stay: false,
             horizon_s: None,
+            changes_per_300_s: None,
         }
     }
 }

@@ -13,7 +13,7 @@
 //! | flag | `true` or `false` |
 //! | name, choice | the characters themselves (a name cannot contain a line break) |
 //! | formula | as it is printed, whatever its spaces and words; without one no such line |
-//! | absent | `none`; in `[plant.governor]` no such line |
+//! | absent | `none`; for keys that came after the first tables no such line |
 //!
 //! Nothing in it depends on the platform, on the order of keys in the file or on how a number was
 //! written there. A new key changes every hash: a table must then be built and verified again,
@@ -24,12 +24,14 @@ use std::fmt::Write as _;
 use sha2::{Digest, Sha256};
 
 use super::Spec;
-use super::keys::{FORMULA, KEYS, KeyValue};
+use super::keys::{CHANGES, FORMULA, KEYS, KeyValue, RECOVERY};
 
 /// Section that no table depends on.
 const LABORATORY: &str = "charger";
 /// Section of which a key that is absent gives no line: it came after the first tables.
 const GOVERNOR: &str = "plant.governor";
+/// Other keys that give no line where they are absent.
+const LATER: [&str; 3] = [FORMULA, RECOVERY, CHANGES];
 const HEADING: &str = "holdfast-spec-1\n";
 
 impl Spec {
@@ -45,11 +47,9 @@ impl Spec {
         let mut text = HEADING.to_owned();
         for key in KEYS {
             let value = (key.get)(self);
-            if key.path == FORMULA && value == KeyValue::Absent {
-                continue;
-            }
+            let came_later = LATER.contains(&key.path) || key.section() == GOVERNOR;
             let absent = value == KeyValue::Absent;
-            if key.section() == LABORATORY || (absent && key.section() == GOVERNOR) {
+            if key.section() == LABORATORY || (absent && came_later) {
                 continue;
             }
             text.push_str(key.path);
@@ -118,12 +118,20 @@ mod tests {
         assert!(text.contains("\nuncertainty.loss_gw=4000000000000000,4000000000000000\n"));
         assert!(text.contains("\nrequirements.containment_hz=none\n"));
         assert!(text.ends_with("\nmethod.between_samples=false\n"));
-        // The heading, and every key but the formula and the governors' limits, which are absent,
-        // and the laboratory's.
-        let left_out =
-            |key: &&super::super::keys::Key| [LABORATORY, GOVERNOR].contains(&key.section());
+        // The heading, and every key but the later ones, which are absent, and the laboratory's.
+        let left_out = |key: &&super::super::keys::Key| {
+            [LABORATORY, GOVERNOR].contains(&key.section()) || LATER.contains(&key.path)
+        };
         let left_out = KEYS.iter().filter(left_out);
-        assert_eq!(text.lines().count(), KEYS.len() - left_out.count());
+        assert_eq!(text.lines().count(), 1 + KEYS.len() - left_out.count());
+    }
+
+    #[test]
+    fn a_key_that_came_later_is_in_the_hash_only_where_it_is_stated() {
+        let text = |set: &[String]| Spec::load("gb-bi", set).unwrap().canonical_text();
+        assert!(LATER.iter().all(|key| !text(&[]).contains(key)));
+        let stated = text(&[format!("{CHANGES}=30")]);
+        assert!(stated.contains("\nrequirements.changes_per_300_s=403e000000000000\n"));
     }
 
     #[test]

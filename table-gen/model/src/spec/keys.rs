@@ -205,6 +205,10 @@ const _: () = assert!((STATE_MAX + WIDTH_MAX / 2.0) * MICRO_PER_UNIT <= i32::MAX
 
 /// The key of the formula, which gives others.
 pub(super) const FORMULA: &str = "requirements.formula";
+/// Key of the preferred law of games.
+pub(super) const RECOVERY: &str = "preference.recovery_per_s";
+/// Key of the claim `quiet`.
+pub(super) const CHANGES: &str = "requirements.changes_per_300_s";
 
 /// Every key, in the order of the spec file. The hash depends on this order and on the paths.
 #[rustfmt::skip] // One key to a group of lines, as a table.
@@ -284,6 +288,8 @@ pub(super) const KEYS: &[Key] = &[
         "how fast the answer to the slope is let go", |s| KeyValue::Number(s.preference.slope_release_gw_per_s)),
     row("preference.smallest_change", "1", Allowed::Number(Range::closed(0.001, 1.0)),
         "smallest change of a charger's participation", |s| KeyValue::Number(s.preference.smallest_change)),
+    row(RECOVERY, "1/s", Allowed::OptionalNumber(Range::closed(0.0, 1000.0)),
+        "how fast f should go to the middle of I2 where a game leaves it free; absent: the smallest table", |s| optional(s.preference.recovery_per_s)),
 
     row("meter.kind", "-", Allowed::Choice(MeterKind::NAMES),
         "what measures the frequency", |s| KeyValue::Text(s.meter.kind.name())),
@@ -360,6 +366,8 @@ pub(super) const KEYS: &[Key] = &[
         "whether f stays in I2 for ever", |s| KeyValue::Flag(s.requirements.stay)),
     row("requirements.horizon_s", "s", Allowed::OptionalNumber(DURATION),
         "time from the event over which claims are made; absent: for ever", |s| optional(s.requirements.horizon_s)),
+    row(CHANGES, "1", Allowed::OptionalNumber(Range::closed(0.0, 1e6)),
+        "most changes of a command by 5 % and more in any 300 s; absent: no such claim", |s| optional(s.requirements.changes_per_300_s)),
 
     row("table.domain", "-", Allowed::Choice(Domain::NAMES),
         "which cells the table answers for", |s| KeyValue::Text(s.table.domain.name())),

@@ -51,6 +51,13 @@ pub struct PreferenceSpec {
     ///
     /// Unit: 1. Allowed: a number from 0.001 to 1. Default: 0.05.
     pub smallest_change: f64,
+    /// Laws by games: how fast f should go to the middle of I2 where the game leaves it free. Then
+    /// every cell takes the allowed input that is nearest to this, and bytes come last; absent: the
+    /// inputs that make the smallest table. For `table.domain = "winning"`.
+    ///
+    /// Unit: 1/s. Allowed: a number from 0 to 1000, or none. Default: none.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub recovery_per_s: Option<f64>,
 }
 
 impl Default for PreferenceSpec {
@@ -65,6 +72,7 @@ impl Default for PreferenceSpec {
             slope_most_gw: 0.9,
             slope_release_gw_per_s: 0.05,
             smallest_change: 0.05,
+            recovery_per_s: None,
         }
     }
 }

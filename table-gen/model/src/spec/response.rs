@@ -2,10 +2,11 @@
 
 use firmware::response::WINDOW_TICKS_MAX;
 
+use super::keys::RECOVERY;
 use super::meter::MeterKind;
 use super::origin::{Origin, inconsistent};
 use super::sampling::to_whole_ms;
-use super::{Spec, SpecError};
+use super::{Domain, Spec, SpecError};
 use crate::table_fields;
 
 /// Checks the preferred law, and that the spec's method covers what is uncertain.
@@ -20,6 +21,10 @@ pub(super) fn check(spec: &Spec, origin: &Origin) -> Result<(), SpecError> {
 /// A law that the device can hold in whole numbers.
 fn check_law(spec: &Spec, origin: &Origin) -> Result<(), SpecError> {
     let preference = &spec.preference;
+    if let Some(found) = preference.recovery_per_s {
+        let allowed = "none beside preference.always_on = true: no game leaves anything free";
+        return Err(inconsistent(origin, RECOVERY, found.to_string(), allowed));
+    }
     let watch_ms = spec.sampling.watch_ms().max(1);
     let window_s = preference.slope_window_s;
     let ticks = spec.sampling.ticks_of(window_s);
@@ -58,6 +63,10 @@ fn check_law(spec: &Spec, origin: &Origin) -> Result<(), SpecError> {
 
 /// What games do not cover must not be there.
 fn check_games(spec: &Spec, origin: &Origin) -> Result<(), SpecError> {
+    if let (Some(found), Domain::Reachable) = (spec.preference.recovery_per_s, spec.table.domain) {
+        let allowed = "none beside table.domain = \"reachable\", which follows no preferred law";
+        return Err(inconsistent(origin, RECOVERY, found.to_string(), allowed));
+    }
     let uncertainty = &spec.uncertainty;
     let is_response = "a response: preference.always_on = true";
     let refuse = |key: &'static str, found: String, other: &str| {

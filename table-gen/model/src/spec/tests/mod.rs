@@ -3,6 +3,7 @@
 
 use std::collections::BTreeSet;
 
+use super::keys::{CHANGES, FORMULA, RECOVERY};
 use super::*;
 
 mod formula;
@@ -120,6 +121,7 @@ fn shipped_specs_state_every_key() {
             stated.insert("requirements.horizon_s".to_owned());
         }
         let is_response = text.contains("\nalways_on = true");
+        stated.remove(RECOVERY);
         // A formula is another way to state the requirements, and a band that is absent is the
         // plant's number. What only a response has is not stated in a spec for games.
         let only_of_responses = |key: &str| {
@@ -139,7 +141,8 @@ fn shipped_specs_state_every_key() {
             .map(|doc| doc.key.to_owned())
             // The laboratory's cars are ideal unless a spec says otherwise.
             .filter(|key| !key.starts_with("charger.") && !key.starts_with("plant.governor."))
-            .filter(|key| key != super::keys::FORMULA && (is_response || !only_of_responses(key)))
+            .filter(|key| ![FORMULA, CHANGES, RECOVERY].contains(&key.as_str()))
+            .filter(|key| is_response || !only_of_responses(key))
             .collect();
         stated.retain(|key| !key.ends_with("_per_hz") || !key.starts_with("uncertainty."));
         stated.retain(|key| !key.starts_with("charger."));
@@ -207,6 +210,7 @@ fn the_hash_changes_with_every_key() {
         "preference.slope_most_gw=0.8",
         "preference.slope_release_gw_per_s=0.04",
         "preference.smallest_change=0.04",
+        "preference.recovery_per_s=1",
         "meter.kind=zero-crossing",
         "meter.jitter_us=1",
         "meter.clock_ppm=20",
@@ -233,6 +237,7 @@ fn the_hash_changes_with_every_key() {
         "requirements.settle_within_s=59",
         "requirements.stay=true",
         "requirements.horizon_s=none",
+        "requirements.changes_per_300_s=30",
         "table.domain=reachable",
         "table.version=2",
         "method.successor=exact-linear",

@@ -293,3 +293,16 @@ fn a_response_fits_the_device() {
         "{error}"
     );
 }
+
+#[test]
+fn a_preferred_law_of_games_goes_with_every_winning_cell() {
+    let law = "preference.recovery_per_s=1";
+    with(&[law]).unwrap();
+    refused(
+        &[law, "table.domain=reachable"],
+        "preference.recovery_per_s",
+    );
+    let set = [law.to_owned()];
+    let error = Spec::load("gb-bi", &set).unwrap_err();
+    assert_eq!(error.key(), Some("preference.recovery_per_s"), "{error}");
+}
