@@ -286,6 +286,15 @@ fn compare_agrees(dir: &Path, json: &dyn Fn(&[&str]) -> Value) {
     let rows = found["rows"].as_array().unwrap();
     assert_eq!(rows.len(), 3 * 2 * 4);
     assert_eq!(found["compared"], 6);
+    // What the runs were watched for: the most changes of any row of the table, and no limit.
+    let claim = &found["claims"][0];
+    let of_table = rows.iter().filter(|row| row["controller"] == "table");
+    let most = of_table
+        .filter_map(|row| row["changes_most"].as_u64())
+        .max();
+    assert_eq!(claim["name"], "quiet");
+    assert_eq!(claim["bound"].as_f64(), most.map(|n| n as f64));
+    assert_eq!(claim["limit"], Value::Null);
     let row = |controller: &str| {
         let is = |row: &&Value| {
             row["loss_gw"] == 2.0

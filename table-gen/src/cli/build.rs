@@ -15,6 +15,7 @@ use super::report::fleet_of;
 use super::synth_report::SynthReport;
 use super::{Failure, OutputArgs, SpecArgs, compare, output, progress, run_tables, verify};
 use lab::compare::CompareConfig;
+use lab::compare::quiet;
 use lab::compare::verdict::Verdict;
 use lab::report::{self, FLEET_CHARGERS, Findings};
 use lab::simulation::closed_loop::{self, Estimator};
@@ -22,7 +23,7 @@ use lab::simulation::monitor::Summary;
 use lab::simulation::scenario::Scenario;
 use lab::simulation::trajectory::PhaseSpan;
 use model::hex::hex;
-use model::verdict::ClaimName;
+use model::verdict::{Claim, ClaimName};
 use synth::budget;
 use synth::compress::{CompressedLaw, Options, VISITS_GOAL};
 use synth::pipeline::{self, Emitted, Encoding};
@@ -104,6 +105,8 @@ struct BuildReport<'r> {
     phases: &'r [PhaseSpan],
     /// Where the table loses to the droop, at the spec's inertia.
     compare: &'r Verdict,
+    /// What the runs of the comparison were watched for; nothing of it is proven.
+    monitored: &'r [Claim],
 }
 
 /// Runs the command.
@@ -129,6 +132,7 @@ pub(super) fn run(args: &BuildArgs) -> Result<(), Failure> {
     let config = CompareConfig::of(&spec);
     let found = compare::scorecard_of(&spec, &table, &config)?;
     let against_droop = Verdict::of(&found, &config.chargers);
+    let monitored = quiet::claim(&spec, &config, &found);
     let verdict = verify::examine(&bytes, &spec)?;
     let result = BuildReport {
         synth: &synth,
@@ -142,6 +146,7 @@ pub(super) fn run(args: &BuildArgs) -> Result<(), Failure> {
         simulation: &run.summary,
         phases: &run.phases,
         compare: &against_droop,
+        monitored: std::slice::from_ref(&monitored),
     };
     let json = serde_json::to_string_pretty(&result).map_err(Failure::bad)?;
     let verdict_json = serde_json::to_string_pretty(&verdict).map_err(Failure::bad)?;
@@ -172,6 +177,7 @@ pub(super) fn run(args: &BuildArgs) -> Result<(), Failure> {
         output::line(json);
     } else {
         output::line(against_droop.sentence());
+        output::line(quiet::sentence(&monitored));
         synth.print();
         print_encodings(&result);
         verify::print(&verdict);

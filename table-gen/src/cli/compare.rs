@@ -11,11 +11,13 @@ use super::files::write_all;
 use super::shares::Job;
 use super::{Failure, OutputArgs, SpecArgs, output, progress};
 use lab::compare::chargers::ChargersConfig;
+use lab::compare::quiet;
 use lab::compare::verdict::Verdict;
 use lab::compare::{self, CHARGERS, CHARGERS_MAX, CompareConfig, CompareError, Row, Scorecard};
 use lab::report::{page, scorecard};
 use lab::simulation::scenario::DURATION_S_MAX;
 use model::spec::Spec;
+use model::verdict::Claim;
 use synth::pipeline;
 
 /// Distance between losses \[GW\].
@@ -85,6 +87,8 @@ struct CompareReport<'r> {
     duration_s: f64,
     #[serde(flatten)]
     verdict: &'r Verdict,
+    /// What the runs were watched for; nothing of it is proven.
+    claims: &'r [Claim],
     rows: &'r [Row],
 }
 
@@ -119,6 +123,7 @@ pub(super) fn run(args: &CompareArgs) -> Result<(), Failure> {
         write_figures(dir, &spec, &config, &found)?;
     }
     let verdict = Verdict::of(&found, &config.chargers);
+    let monitored = quiet::claim(&spec, &config, &found);
     if args.output.json {
         return output::json(&CompareReport {
             spec: &spec.name,
@@ -128,10 +133,12 @@ pub(super) fn run(args: &CompareArgs) -> Result<(), Failure> {
             trigger_hz: config.trigger_hz,
             duration_s: config.duration_s,
             verdict: &verdict,
+            claims: std::slice::from_ref(&monitored),
             rows: &found.rows,
         });
     }
     output::line(verdict.sentence());
+    output::line(quiet::sentence(&monitored));
     for inertia in &config.inertias {
         output::line(format_args!("H = {inertia} GW s/Hz; nadirs in Hz"));
         let mut table = output::table(&scorecard::HEADER);

@@ -2,7 +2,7 @@
 
 use super::closed_loop::Model;
 use super::outcome::{Outcome, Violation};
-use super::{delayed_loop, dispatch, header, image};
+use super::{delayed_loop, dispatch, header, image, quiet};
 use firmware::table::{Law, TableView};
 use model::spec::Spec;
 use model::verdict::{Claim, ClaimName};
@@ -58,7 +58,18 @@ impl Findings<'_> {
             claims.push(self.stay());
         }
         claims.push(self.table_claim());
+        claims.extend(quiet::claim(self.table, self.spec).map(|claim| self.in_table(claim)));
         claims
+    }
+
+    /// A claim that rests on every decision having an entry: without one the droop answers.
+    fn in_table(&self, claim: Claim) -> Claim {
+        let uncovered = self.reason(&[Violation::Uncovered]);
+        Claim {
+            holds: claim.holds && uncovered.is_none(),
+            reason: claim.reason.or(uncovered),
+            ..claim
+        }
     }
 
     /// Why a claim that rests on these violations does not hold.

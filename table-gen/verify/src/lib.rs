@@ -69,6 +69,7 @@ mod image;
 mod no_control;
 mod outcome;
 mod path;
+mod quiet;
 mod regions;
 pub mod response;
 mod successor;
@@ -214,6 +215,7 @@ fn of_response(
     claims.extend(image::claim(table, spec));
     let proof = response::verify(table, spec, go_on)?;
     claims.extend(proof.claims);
+    claims.extend(quiet::claim(table, spec));
     Ok(Verdict {
         verified: claims.iter().all(|claim| claim.holds),
         spec: spec.name.clone(),

@@ -12,11 +12,13 @@
 //! |---|---|
 //! | [`chargers`] | the fleet: own clocks, own meters, own delays |
 //! | [`course`] | the grid in time, and what is measured on the way |
+//! | [`quiet`] | how often a charger's command changed |
 //! | [`verdict`] | where the table loses to the droop |
 
 pub mod chargers;
 pub mod course;
 mod outcome;
+pub mod quiet;
 pub mod verdict;
 
 use firmware::table::TableView;
