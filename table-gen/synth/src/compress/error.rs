@@ -29,6 +29,12 @@ pub enum CompressError {
         /// The state, in micro-units.
         state: [i32; STATES],
     },
+    /// The preferred law does not fit the format.
+    #[error(
+        "the preferred law changes by 32 levels or more from one cell to the next: take a smaller \
+         grid.width or a less steep law"
+    )]
+    TooSteep,
     /// A table cannot be assembled.
     #[error(transparent)]
     Emit(#[from] EmitError),

@@ -88,10 +88,11 @@ impl PieceSet {
     }
 }
 
-/// Chooses pieces from candidates: each in turn the one that fits the most cells (by index and
-/// allowed inputs) that no earlier piece fits. The first is always chosen, the others while they
-/// are worth their bytes.
+/// Chooses pieces: the preferred one, then from candidates each in turn the one that fits the most
+/// cells (by index and allowed inputs) that no earlier piece fits. The first is always chosen, the
+/// others while they are worth their bytes.
 pub fn choose_pieces(
+    preferred: Option<AffineFunction>,
     candidates: &[AffineFunction],
     levels: u8,
     cells: &[([u16; STATES], u32)],
@@ -102,7 +103,8 @@ pub fn choose_pieces(
     let fits = |piece: &AffineFunction, (cell, allowed): &([u16; STATES], u32)| {
         allowed >> piece.level(Cell(*cell), levels) & 1 == 1
     };
-    let mut pieces: Vec<AffineFunction> = Vec::new();
+    let mut pieces: Vec<AffineFunction> = preferred.into_iter().collect();
+    open.retain(|cell| !pieces.iter().any(|piece| fits(piece, cell)));
     while pieces.len() < PIECES_MAX {
         let counts: Vec<usize> = candidates
             .par_iter()
@@ -197,10 +199,10 @@ mod tests {
         // RISING fits f = 0 to 4 and THREE fits 3, 5 and 6: after RISING it adds two.
         let mut cells: Vec<_> = (0..5).map(|f| (at(f), 1 << f)).collect();
         cells.extend([5, 6].map(|f| (at(f), 1 << 3)));
-        let chosen = choose_pieces(&[THREE, RISING], LEVELS, &cells);
+        let chosen = choose_pieces(None, &[THREE, RISING], LEVELS, &cells);
         assert_eq!(chosen.pieces, [RISING, THREE]);
         // Where the first fits all, no second is worth its bytes.
-        let chosen = choose_pieces(&[THREE, RISING], LEVELS, &cells[..5]);
+        let chosen = choose_pieces(None, &[THREE, RISING], LEVELS, &cells[..5]);
         assert_eq!(chosen.pieces, [RISING]);
     }
 }

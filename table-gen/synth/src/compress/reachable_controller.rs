@@ -59,7 +59,7 @@ impl Controller {
         candidates: &[AffineFunction],
     ) -> Result<Self, CompressError> {
         let levels = task.abstraction.inputs() as u8;
-        let laws = choose_pieces(candidates, levels, &task.cells(task.solution));
+        let laws = choose_pieces(None, candidates, levels, &task.cells(task.solution));
         let solution = match task.target {
             Some(target) if task.rounds > 0 => task.ranked_by(&laws, target)?,
             _ => task.solution.clone(),

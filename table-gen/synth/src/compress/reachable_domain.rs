@@ -45,6 +45,7 @@ impl Context<'_, '_> {
                 guard: &guard,
                 watch: watch.as_ref(),
                 solution: &solved.solution,
+                preferred: None,
                 candidates: &candidates,
                 depth_max: INPUTS_DEPTH_MAX,
                 depth_goal: VISITS_GOAL,

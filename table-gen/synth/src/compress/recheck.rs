@@ -13,7 +13,7 @@ use super::CompressError;
 use crate::abstraction::Abstraction;
 use crate::abstraction::affine::AffineAbstraction;
 use crate::game::bitset::BitSet;
-use crate::game::restricted::Restricted;
+use crate::game::restricted::{LastResort, Restricted};
 use crate::game::{Solution, Unwatched};
 use crate::synthesis::OptionalGuard;
 use model::grid_shape::GridShape;
@@ -88,7 +88,7 @@ pub fn recheck(
         guard,
         watch: &Unwatched,
     };
-    let Solution { ranks, winning, .. } = game.reach(&answer, false)?;
+    let Solution { ranks, winning, .. } = game.reach(&answer, LastResort::None)?;
     let steps = domain.iter().map(|index| ranks[index]).max().unwrap_or(0);
     Ok(Recheck {
         answered: domain.count(),

@@ -22,7 +22,7 @@ use super::{
 use crate::abstraction::Abstraction;
 use crate::game::Solution;
 use crate::game::bitset::BitSet;
-use crate::game::restricted::Restricted;
+use crate::game::restricted::{LastResort, Restricted};
 use crate::synthesis::{SolvedLaw, Synthesis};
 use model::plant::STATES;
 
@@ -131,7 +131,7 @@ impl Context<'_, '_> {
                     all
                 }
             };
-            let solution = game.reach(&decided, false)?;
+            let solution = game.reach(&decided, LastResort::None)?;
             if solution.winning == everywhere.count() {
                 return self.beside(c1, c2, inner, asked, &solution).map(Some);
             }
@@ -176,6 +176,7 @@ impl Context<'_, '_> {
             guard: &guard,
             watch: watch.as_ref(),
             solution,
+            preferred: self.preferred(Law::C2)?.as_ref(),
             candidates: &candidates,
             depth_max: INPUTS_DEPTH_MAX,
             depth_goal: VISITS_GOAL.saturating_sub(part.worst_visits),
@@ -253,6 +254,7 @@ impl Context<'_, '_> {
             guard: &guard,
             watch: watch.as_ref(),
             solution: &domain.solution,
+            preferred: self.preferred(law)?.as_ref(),
             candidates: &candidates,
             depth_max: INPUTS_DEPTH_MAX,
             depth_goal: VISITS_GOAL.saturating_sub(domain.part.worst_visits),

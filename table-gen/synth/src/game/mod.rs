@@ -54,6 +54,7 @@ pub mod exchange;
 pub mod inclusion;
 pub mod inputs;
 pub mod ledger;
+pub mod levels;
 pub mod reach;
 pub mod reactive;
 pub mod restricted;

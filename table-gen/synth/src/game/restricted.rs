@@ -11,6 +11,7 @@ use rayon::prelude::*;
 
 use super::bitset::BitSet;
 use super::inclusion::Inclusion;
+use super::levels::widened;
 use super::reach::included;
 use super::{GameError, NOT_WON, SWEEPS_MAX, Solution, Sweep, Watch};
 use crate::abstraction::Abstraction;
@@ -21,6 +22,18 @@ const CELLS_PER_TASK: usize = 4096;
 
 /// Inputs (bits) that a controller may use at a cell, given by dense index and axis indices.
 pub type Chosen<'c, const D: usize> = dyn Fn(usize, [u32; D]) -> u32 + Sync + 'c;
+
+/// What helps where the chosen inputs win nothing more.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum LastResort {
+    /// Nothing: the rest is lost.
+    None,
+    /// A sweep with all inputs.
+    All,
+    /// Sweeps with the inputs at most 1, 2, 4, … levels from a chosen one, until one wins
+    /// something: a cell departs from what was chosen no further than it must.
+    Nearest,
+}
 
 /// A reach-avoid game for a controller.
 #[derive(Clone, Copy)]
@@ -42,12 +55,15 @@ pub struct Restricted<'g, const D: usize, A, G> {
 
 impl<const D: usize, A: Abstraction<D, Inputs = u32>, G: Guard<D>> Restricted<'_, D, A, G> {
     /// Solves the game for the inputs that `chosen` gives in each cell. Where those win nothing
-    /// more and `last_resort` is set, a sweep with all inputs follows, and then the chosen ones
-    /// again.
+    /// more a sweep with what `last_resort` says follows, and then the chosen ones again.
     ///
     /// # Errors
     /// An empty target, too many sweeps, or an interruption.
-    pub fn reach(&self, chosen: &Chosen<'_, D>, last_resort: bool) -> Result<Solution, GameError> {
+    pub fn reach(
+        &self,
+        chosen: &Chosen<'_, D>,
+        last_resort: LastResort,
+    ) -> Result<Solution, GameError> {
         let Self {
             abstraction,
             target,
@@ -61,7 +77,8 @@ impl<const D: usize, A: Abstraction<D, Inputs = u32>, G: Guard<D>> Restricted<'_
         }
         let shape = abstraction.shape();
         let cells = shape.cells();
-        let all = u32::MAX >> (32 - abstraction.inputs());
+        let all_levels = abstraction.inputs() as u32;
+        let all = u32::MAX >> (u32::BITS - all_levels);
         let mut won = target.clone();
         let mut ranks = vec![NOT_WON; cells];
         for index in target.iter() {
@@ -72,10 +89,11 @@ impl<const D: usize, A: Abstraction<D, Inputs = u32>, G: Guard<D>> Restricted<'_
             .iter()
             .filter(|index| !target.contains(*index))
             .map(|index| (index as u32, chosen(index, shape.cell(index))))
-            .filter(|(_, inputs)| *inputs != 0 || last_resort)
+            .filter(|(_, inputs)| *inputs != 0 || last_resort != LastResort::None)
             .collect();
         let mut winning = 0;
         let mut sweeps = 0u16;
+        // Levels by which cells may depart from what was chosen.
         let mut resort = 0u32;
         loop {
             if sweeps == SWEEPS_MAX {
@@ -96,8 +114,12 @@ impl<const D: usize, A: Abstraction<D, Inputs = u32>, G: Guard<D>> Restricted<'_
                             };
                         let is_settled =
                             settled.is_some_and(|cells| cells.contains(*index as usize));
-                        let resort = if is_settled { 0 } else { resort };
-                        if permitted(*inputs | resort) == 0 {
+                        let tried = match resort {
+                            levels if levels == all_levels && !is_settled => all,
+                            levels if !is_settled => widened(*inputs, levels) & all,
+                            _ => *inputs,
+                        };
+                        if permitted(tried) == 0 {
                             left.push((*index, *inputs));
                         } else {
                             found.push((*index, permitted(all)));
@@ -124,10 +146,15 @@ impl<const D: usize, A: Abstraction<D, Inputs = u32>, G: Guard<D>> Restricted<'_
                 return Err(GameError::Interrupted);
             }
             // The last resort has no more to give either.
-            if new == 0 && (resort == all || !last_resort) {
+            if new == 0 && (resort == all_levels || last_resort == LastResort::None) {
                 break;
             }
-            resort = if new == 0 { all } else { 0 };
+            resort = match (new, last_resort, resort) {
+                (0, LastResort::Nearest, 0) => 1,
+                (0, LastResort::Nearest, levels) => (2 * levels).min(all_levels),
+                (0, ..) => all_levels,
+                _ => 0,
+            };
             open = left.concat();
         }
         Ok(Solution {
