@@ -60,16 +60,45 @@ fn the_first_two_seconds_of_a_flashed_table() {
     assert!(text.starts_with("// paper-bi: 1 - Pmax=? [F<="));
 }
 
+/// What is drawn may stand in the spec: the table's hash does not depend on it, and an option is
+/// stronger. A chain that has too many nodes is cut, the command says so, and the bound is one.
 #[test]
-fn a_limit_is_no_and_bad_input_is_named() {
+fn the_spec_says_what_is_drawn_and_a_cut_chain_says_so() {
+    let json = |rest: &[&str]| -> serde_json::Value {
+        let out = prob("paper-bi.bin", &[&["--spec", "paper-bi"], rest].concat());
+        assert_eq!(out.status.code(), Some(0), "{out:?}");
+        serde_json::from_slice(&out.stdout).unwrap()
+    };
+    let certain = json(&["--json"]);
+    assert_eq!(certain["lower_bound"].as_f64(), Some(1.0));
+    assert_eq!(certain["states"].as_u64(), Some(0));
+    let drawn = ["--set", "chance.participation=uniform:0.0005", "--json"];
+    // All draws within what the verifier proves: no chain is needed, and this one is cut at once.
+    let union = json(&[&drawn[..], &["--errors", "0.0005", "--nodes-max", "10"]].concat());
+    assert_eq!(union["lower_bound"].as_f64(), Some(1.0));
+    assert!(union["cut"]["nodes"].as_u64().unwrap() > 0);
+    let cut = json(&[&drawn[..], &["--nodes-max", "10"]].concat());
+    assert_eq!(cut["lower_bound"].as_f64(), Some(0.0));
+    let option = json(&[&drawn[..], &["--participation", "exact"]].concat());
+    assert_eq!(option["lower_bound"].as_f64(), Some(1.0));
+    assert!(option["states"].as_u64().unwrap() > 10_000 && option["cut"].is_null());
+}
+
+#[test]
+fn bad_input_is_named() {
     let spec = ["--spec", "paper-bi"];
     let code = |name: &str, rest: &[&str]| {
         let out = prob(name, &[&spec[..], rest].concat());
         (out.status.code(), String::from_utf8(out.stderr).unwrap())
     };
-    let (exit, said) = code("paper-bi.bin", &["--nodes-max", "10"]);
+    let (exit, said) = code("paper-bi.bin", &["--set", "chance.participation=gauss"]);
     assert!(
-        exit == Some(1) && said.contains("more than 10 nodes"),
+        exit == Some(2) && said.contains("chance.participation: found \"gauss\"; allowed: "),
+        "{said}"
+    );
+    let (exit, said) = code("paper-bi.bin", &["--set", "chance.loss=no-such.csv"]);
+    assert!(
+        exit == Some(2) && said.contains("chance.loss: no-such.csv"),
         "{said}"
     );
     let (exit, said) = code("paper-uni.bin", &[]);

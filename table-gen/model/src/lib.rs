@@ -9,6 +9,7 @@
 //! | [`propagator`] | the equations | the exact step in plain numbers |
 //! | [`governor`], [`stepper`] | governors with limits | the same, not linear |
 //! | [`interval`], [`flow`] | the equations | enclosures of the flow over a time |
+//! | [`participation`] | a text | how the delivered participation is drawn |
 //! | [`table_fields`] | a spec | plant, droop, hypotheses and response in a table's whole numbers |
 //! | [`grid_shape`] | a grid of cells | cell numbers |
 //! | [`hex`] | bytes | what people read |
@@ -23,6 +24,7 @@ pub mod grid_shape;
 pub mod hex;
 pub mod interval;
 pub mod logic;
+pub mod participation;
 pub mod plant;
 pub mod propagator;
 pub mod spec;

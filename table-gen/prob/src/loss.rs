@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use model::spec::LOSS_SYNTHETIC;
 use serde::Serialize;
 
 /// Losses of sizes in a band.
@@ -65,8 +66,6 @@ pub enum LossError {
     },
 }
 
-/// Name of the synthetic distribution.
-pub const SYNTHETIC: &str = "gb-synthetic";
 /// Events a year above [`LEAST_GW`], the scale of their sizes, and the ends and width of the bands.
 const EVENTS_PER_YEAR: f64 = 20.0;
 const SCALE_GW: f64 = 0.35;
@@ -80,7 +79,7 @@ impl Losses {
     /// # Errors
     /// A file that cannot be read, or is no distribution.
     pub fn load(name: &str) -> Result<Self, LossError> {
-        if name == SYNTHETIC {
+        if name == LOSS_SYNTHETIC {
             Ok(Self::synthetic())
         } else {
             Self::from_csv(Path::new(name))

@@ -15,6 +15,7 @@
 //! | choices | 2,000 states at random, 4 branches of up to 5 members, 40 steps |
 //! | large | 100,000 states at random, 8 branches of up to 3 members, 120 steps |
 //! | paper-bi | the first two seconds of a flashed table, the participation normal with 0.2 % |
+//! | paper-bi, cut | two minutes of it, cut at 40,000 nodes |
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on fails")]
 
 use std::fs::File;

@@ -33,32 +33,35 @@ pub(super) struct ProbArgs {
     #[command(flatten)]
     output: super::OutputArgs,
     /// Error of the delivered participation, drawn anew each period: exact, uniform:BOUND,
-    /// gaussian:SIGMA[,DEVIATIONS], truncated:SIGMA,BOUND or bernoulli:CHARGERS; default: as the
-    /// spec bounds it, with certainty
+    /// gaussian:SIGMA[,DEVIATIONS], truncated:SIGMA,BOUND or bernoulli:CHARGERS; default:
+    /// chance.participation, or as the spec bounds it, with certainty
     #[arg(long, value_name = "KIND")]
     participation: Option<Participation>,
-    /// A response: time from one draw to the next [s]; default: the spec's period
+    /// A response: time from one draw to the next [s]; default: chance.draw_interval_s, or the
+    /// period
     #[arg(long, value_name = "S")]
     draw_interval_s: Option<f64>,
-    /// A response: relative errors for which each band of losses is examined besides the spec's
+    /// Relative errors for which each band of losses is examined besides the spec's
     #[arg(long, value_name = "E,E,...", value_delimiter = ',')]
     errors: Vec<f64>,
-    /// Sizes of the loss: a CSV of loss_gw,weight (weights in events a year), or gb-synthetic
+    /// Sizes of the loss: a CSV of loss_gw,weight (weights in events a year), or gb-synthetic;
+    /// default: chance.loss, or the spec's band
     #[arg(long, value_name = "FILE")]
     loss: Option<String>,
-    /// Normal noise of each reading of f, beside the meter's own error: standard deviation [Hz]
+    /// Normal noise of each reading of f, beside the meter's own error: standard deviation [Hz];
+    /// default: chance.noise_hz, or none
     #[arg(long, value_name = "HZ")]
     noise_hz: Option<f64>,
     /// Time over which the promise is bounded; default: the spec's horizon, or 120 [s]
     #[arg(long, value_name = "S")]
     horizon_s: Option<f64>,
     /// Width of a bin of the fleet's power [GW]
-    #[arg(long, value_name = "GW", default_value_t = 0.005)]
+    #[arg(long, value_name = "GW", default_value_t = 0.0025)]
     bin_gw: f64,
-    /// Most nodes of a chain
-    #[arg(long, value_name = "N", default_value_t = 2_000_000)]
+    /// Nodes after which a chain is followed no more; what is not followed counts as failed
+    #[arg(long, value_name = "N", default_value_t = 500_000)]
     nodes_max: usize,
-    /// Write the chain in Storm's format
+    /// Write the chain in Storm's format (laws by games, with a participation; exact is one)
     #[arg(long, value_name = "FILE")]
     drn: Option<PathBuf>,
     /// Write the chain as PRISM's explicit files BASE.tra and BASE.lab
@@ -118,22 +121,28 @@ fn question(args: &ProbArgs, spec: &Spec) -> Result<Question, Failure> {
         .horizon_s
         .or(spec.requirements.horizon_s)
         .unwrap_or(HORIZON_S);
-    let interval = args.draw_interval_s.unwrap_or(spec.sampling.period_s);
+    let chance = &spec.chance;
+    let interval = args
+        .draw_interval_s
+        .or(chance.draw_interval_s)
+        .unwrap_or(spec.sampling.period_s);
     for error in &args.errors {
         within("--errors", *error, [0.0, 1.0])?;
     }
     let noise_hz = match args.noise_hz {
         Some(sigma) => Some(within("--noise-hz", sigma, [0.0, 1.0])?),
-        None => None,
+        None => chance.noise_hz,
     };
-    let losses = args
-        .loss
-        .as_deref()
-        .map(Losses::load)
-        .transpose()
-        .map_err(Failure::bad)?;
+    let losses = match (&args.loss, &chance.loss) {
+        (Some(name), _) => Some(Losses::load(name).map_err(Failure::bad)?),
+        (None, Some(name)) => Some(
+            Losses::load(name)
+                .map_err(|error| Failure::BadInput(format!("chance.loss: {error}")))?,
+        ),
+        (None, None) => None,
+    };
     Ok(Question {
-        participation: args.participation,
+        participation: args.participation.or(chance.drawn()),
         draw_interval_s: within("--draw-interval-s", interval, [0.0, 3600.0])?,
         losses,
         noise_hz,
@@ -148,7 +157,7 @@ fn question(args: &ProbArgs, spec: &Spec) -> Result<Question, Failure> {
 
 fn failure(error: AnalysisError) -> Failure {
     match &error {
-        AnalysisError::Chain(ClosedLoopError::TooLarge { .. } | ClosedLoopError::Interrupted)
+        AnalysisError::Chain(ClosedLoopError::Interrupted)
         | AnalysisError::Verify(VerifyError::Interrupted)
         | AnalysisError::Table(_) => Failure::No(error.to_string()),
         _ => Failure::bad(error),
@@ -162,7 +171,7 @@ fn exported(args: &ProbArgs, spec: &Spec, answer: &Answer) -> Result<(), Failure
     }
     let Some(chain) = &answer.chain else {
         return Err(Failure::BadInput(
-            "--drn, --prism: a response has no chain; tables of laws by games do".to_owned(),
+            "--drn, --prism: there is no chain; laws by games have one where --participation is given (exact is one)".to_owned(),
         ));
     };
     let fail = |error: std::io::Error| Failure::bad(error);
@@ -253,6 +262,16 @@ fn print(spec: &Spec, answer: &Answer, simulated: Option<&Runs>) {
             output::grouped(answer.transitions),
             answer.steps,
             1e3 * answer.reach_hz.unwrap_or(0.0)
+        ));
+    }
+    if let Some(cut) = &answer.cut {
+        let until = cut.lower_bound.map_or("no time".to_owned(), |bound| {
+            format!("{:.1} s: P >= {bound:.9}", cut.until_s)
+        });
+        output::line(format_args!(
+            "cut: {} nodes after {} steps are more than --nodes-max and count as failed; nothing is lost by that over {until}",
+            output::grouped(cut.nodes),
+            cut.steps
         ));
     }
     output::line(format_args!("most is lost by: {}", answer.dominates));

@@ -3,6 +3,8 @@
 
 use std::fmt;
 
+use super::chance::LOSS_SYNTHETIC;
+
 /// An interval of finite numbers, each end included or not.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Range {
@@ -110,6 +112,10 @@ pub enum Allowed {
     Name,
     /// A formula of temporal logic, or no such key at all.
     OptionalFormula,
+    /// A distribution of the delivered participation, or no such key at all.
+    OptionalParticipation,
+    /// A distribution of the size of the loss, or no such key at all.
+    OptionalLoss,
 }
 
 impl Allowed {
@@ -117,9 +123,15 @@ impl Allowed {
     /// default.
     #[must_use]
     pub fn is_optional(&self) -> bool {
+        matches!(self, Self::OptionalNumber(_) | Self::OptionalNumbers { .. })
+            || self.is_optional_text()
+    }
+
+    /// Whether it is a text of a form of its own that may be absent.
+    pub(super) fn is_optional_text(&self) -> bool {
         matches!(
             self,
-            Self::OptionalNumber(_) | Self::OptionalNumbers { .. } | Self::OptionalFormula
+            Self::OptionalFormula | Self::OptionalParticipation | Self::OptionalLoss
         )
     }
 }
@@ -143,6 +155,11 @@ impl fmt::Display for Allowed {
                 Ok(())
             }
             Self::OptionalFormula => f.write_str("a formula in the supported fragment, or none"),
+            Self::OptionalParticipation => write!(f, "{}, or none", crate::participation::ALLOWED),
+            Self::OptionalLoss => write!(
+                f,
+                "\"{LOSS_SYNTHETIC}\" or the path of a .csv file, or none"
+            ),
             Self::Name => write!(
                 f,
                 "1 to {NAME_LEN_MAX} ASCII letters, digits, - _ or ., the first a letter or digit"

@@ -17,7 +17,8 @@
 //!
 //! Nothing in it depends on the platform, on the order of keys in the file or on how a number was
 //! written there. A new key changes every hash: a table must then be built and verified again,
-//! which is intended. The keys of `[charger]` are the laboratory's alone and stand in no hash.
+//! which is intended. The keys of `[charger]` are the laboratory's alone, and those of `[chance]`
+//! change neither a table nor a proof: they stand in no hash.
 
 use std::fmt::Write as _;
 
@@ -26,8 +27,8 @@ use sha2::{Digest, Sha256};
 use super::Spec;
 use super::keys::{CHANGES, FORMULA, KEYS, KeyValue, RECOVERY};
 
-/// Section that no table depends on.
-const LABORATORY: &str = "charger";
+/// Sections that no table depends on: the laboratory's cars, and what is drawn.
+const NOT_OF_THE_TABLE: [&str; 2] = ["charger", "chance"];
 /// Section of which a key that is absent gives no line: it came after the first tables.
 const GOVERNOR: &str = "plant.governor";
 /// Other keys that give no line where they are absent.
@@ -49,7 +50,7 @@ impl Spec {
             let value = (key.get)(self);
             let came_later = LATER.contains(&key.path) || key.section() == GOVERNOR;
             let absent = value == KeyValue::Absent;
-            if key.section() == LABORATORY || (absent && came_later) {
+            if NOT_OF_THE_TABLE.contains(&key.section()) || (absent && came_later) {
                 continue;
             }
             text.push_str(key.path);
@@ -118,9 +119,11 @@ mod tests {
         assert!(text.contains("\nuncertainty.loss_gw=4000000000000000,4000000000000000\n"));
         assert!(text.contains("\nrequirements.containment_hz=none\n"));
         assert!(text.ends_with("\nmethod.between_samples=false\n"));
-        // The heading, and every key but the later ones, which are absent, and the laboratory's.
+        // The heading, and every key but the later ones, which are absent, and those that no table
+        // depends on.
         let left_out = |key: &&super::super::keys::Key| {
-            [LABORATORY, GOVERNOR].contains(&key.section()) || LATER.contains(&key.path)
+            let section = key.section();
+            NOT_OF_THE_TABLE.contains(&section) || section == GOVERNOR || LATER.contains(&key.path)
         };
         let left_out = KEYS.iter().filter(left_out);
         assert_eq!(text.lines().count(), 1 + KEYS.len() - left_out.count());

@@ -163,6 +163,10 @@ fn optional(value: Option<f64>) -> KeyValue<'static> {
     value.map_or(KeyValue::Absent, KeyValue::Number)
 }
 
+fn text(value: Option<&str>) -> KeyValue<'_> {
+    value.map_or(KeyValue::Absent, KeyValue::Text)
+}
+
 fn optionals(values: Option<&[f64; 2]>) -> KeyValue<'_> {
     values.map_or(KeyValue::Absent, |values| KeyValue::Numbers(values))
 }
@@ -352,8 +356,17 @@ pub(super) const KEYS: &[Key] = &[
     row("uncertainty.initial.upper", STATE_UNIT, STATE,
         "upper corner of the states at the event (f, g, l, p)", |s| KeyValue::Numbers(&s.uncertainty.initial.upper)),
 
+    row("chance.loss", "-", Allowed::OptionalLoss,
+        "sizes of the loss, as a file of sizes and weights or by name; absent: the band", |s| text(s.chance.loss.as_deref())),
+    row("chance.participation", "-", Allowed::OptionalParticipation,
+        "how the error of the delivered participation is drawn; absent: bounded as above", |s| text(s.chance.participation.as_deref())),
+    row("chance.draw_interval_s", "s", Allowed::OptionalNumber(Range::above(0.0, 3600.0)),
+        "time from one draw of a response's participation to the next; absent: the period", |s| optional(s.chance.draw_interval_s)),
+    row("chance.noise_hz", "Hz", Allowed::OptionalNumber(Range::above(0.0, 1.0)),
+        "deviation of a normal error of each reading, beside the meter's; absent: none", |s| optional(s.chance.noise_hz)),
+
     row(FORMULA, "-", Allowed::OptionalFormula,
-        "the requirements as temporal logic; gives the keys it speaks of", |s| s.requirements.formula.as_deref().map_or(KeyValue::Absent, KeyValue::Text)),
+        "the requirements as temporal logic; gives the keys it speaks of", |s| text(s.requirements.formula.as_deref())),
     row("requirements.containment_hz", "Hz", Allowed::OptionalNumber(Range::closed(-10.0, 0.0)),
         "f never falls below this; absent: no such claim", |s| optional(s.requirements.containment_hz)),
     row("requirements.outer_hz", "Hz", INTERVAL,

@@ -22,6 +22,7 @@
 //! disagree; a test compares it with the structs and with their documentation.
 
 mod allowed;
+mod chance;
 mod charger;
 mod claims;
 mod compile;
@@ -50,6 +51,7 @@ mod tests;
 mod validate;
 
 pub use allowed::{Allowed, Range};
+pub use chance::{ChanceSpec, LOSS_SYNTHETIC};
 pub use charger::ChargerSpec;
 pub use claims::{Domain, InitialBox, LossProfile, RequirementsSpec, TableSpec, UncertaintySpec};
 pub use compile::{Compiled, NotSupported, compile};

@@ -52,7 +52,7 @@ impl Override {
             Some(key) if raw == REMOVE && key.allowed.is_optional() => None,
             _ if raw == REMOVE => return Err(not_optional(text, path)),
             // A name such as 2024 and a formula such as true need no quotes either.
-            Some(key) if matches!(key.allowed, Allowed::Name | Allowed::OptionalFormula) => {
+            Some(key) if key.allowed == Allowed::Name || key.allowed.is_optional_text() => {
                 Some(parse_name(raw))
             }
             _ => Some(parse_value(raw)),

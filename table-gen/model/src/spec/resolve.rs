@@ -57,7 +57,8 @@ fn check_value(key: &'static Key, value: &Value, origin: &Origin) -> Result<(), 
         (Allowed::NumberOrInterval(_), value) => is_number(value),
         (Allowed::Integer { .. }, Value::Integer(_)) => true,
         (Allowed::Flag, Value::Boolean(_)) => true,
-        (Allowed::Choice(_) | Allowed::Name | Allowed::OptionalFormula, Value::String(_)) => true,
+        (Allowed::Choice(_) | Allowed::Name, Value::String(_)) => true,
+        (allowed, Value::String(_)) => allowed.is_optional_text(),
         _ => false,
     };
     if !right_type {

@@ -3,8 +3,9 @@
 use serde::{Deserialize, Serialize};
 
 use super::{
-    BaselineSpec, ChargerSpec, Direction, FleetSpec, GridSpec, InputSpec, MeterSpec, MethodSpec,
-    PlantSpec, PreferenceSpec, RequirementsSpec, SamplingSpec, TableSpec, UncertaintySpec,
+    BaselineSpec, ChanceSpec, ChargerSpec, Direction, FleetSpec, GridSpec, InputSpec, MeterSpec,
+    MethodSpec, PlantSpec, PreferenceSpec, RequirementsSpec, SamplingSpec, TableSpec,
+    UncertaintySpec,
 };
 
 /// A complete specification; one field per section of the TOML document.
@@ -40,6 +41,9 @@ pub struct Spec {
     pub charger: ChargerSpec,
     /// What is not known exactly, as bounds.
     pub uncertainty: UncertaintySpec,
+    /// What is drawn, for bounds on probabilities; absent: nothing.
+    #[serde(skip_serializing_if = "ChanceSpec::is_absent")]
+    pub chance: ChanceSpec,
     /// What is to be proved.
     pub requirements: RequirementsSpec,
     /// What the table covers.
@@ -62,6 +66,7 @@ impl Default for Spec {
             meter: MeterSpec::default(),
             charger: ChargerSpec::default(),
             uncertainty: UncertaintySpec::default(),
+            chance: ChanceSpec::default(),
             requirements: RequirementsSpec::default(),
             table: TableSpec::default(),
             method: MethodSpec::default(),

@@ -2,13 +2,15 @@
 
 use firmware::prediction::DELAY_TICKS_MAX;
 
+use crate::participation::Participation;
+
 use super::allowed::{self, Allowed};
 use super::keys::{KEYS, Key, KeyValue};
 use super::origin::{Origin, inconsistent};
 use super::sampling::{to_ms, to_whole_ms};
 use super::{
-    InputSpec, RequirementsSpec, SamplingSpec, Spec, SpecError, UncertaintySpec, formula, geometry,
-    response,
+    InputSpec, RequirementsSpec, SamplingSpec, Spec, SpecError, UncertaintySpec, chance, formula,
+    geometry, response,
 };
 
 /// The allowed inputs of a cell are a mask of 32 bits.
@@ -76,6 +78,10 @@ fn check_range(key: &'static Key, value: KeyValue<'_>, origin: &Origin) -> Resul
         ) => numbers.iter().all(|x| range.contains(*x)),
         (Allowed::Integer { min, max }, KeyValue::Integer(n)) => (min..=max).contains(&n),
         (Allowed::Name, KeyValue::Text(name)) => allowed::is_valid_name(name),
+        (Allowed::OptionalParticipation, KeyValue::Text(text)) => {
+            text.parse::<Participation>().is_ok()
+        }
+        (Allowed::OptionalLoss, KeyValue::Text(text)) => chance::is_loss(text),
         // The type leaves no other value.
         _ => true,
     };

@@ -1,14 +1,50 @@
-//! Laws by games: a chain for each size of the loss.
+//! Laws by games: the verifier for the size of the loss, and for a drawn participation the better
+//! of two bounds.
+//!
+//! | bound | how |
+//! |---|---|
+//! | union | all draws within an error for which the verifier proves all claims |
+//! | chain | a set-valued Markov chain ([`crate::closed_loop`]) |
 
 use firmware::table::TableView;
 use model::spec::Spec;
 
-use super::{AnalysisError, Answer, Layer, Layers, Question};
+use super::{AnalysisError, Answer, Cut, Layer, Layers, Question, certain};
 use crate::bands::BandProof;
-use crate::closed_loop::{self, ClosedLoop};
+use crate::closed_loop::{self, ClosedLoop, ClosedLoopError};
 use crate::loss::{LossBand, Losses};
-use crate::participation::Participation;
+use crate::participation::{Drawn, Participation};
+use crate::union::all_within;
 use crate::value;
+
+/// What is asked, of which table.
+struct Laws<'a> {
+    table: &'a TableView<'a>,
+    spec: &'a Spec,
+    question: &'a Question,
+    tick_s: f64,
+    period_ticks: u32,
+}
+
+/// Bounds for a drawn participation, at one band of losses.
+struct OfDraws {
+    /// By a union of draws; nothing where no error is proven.
+    union: Option<f64>,
+    /// By a chain, for every number of steps; or why there is none.
+    chain: Result<(ClosedLoop, Vec<f64>), ClosedLoopError>,
+}
+
+impl OfDraws {
+    fn of_chain(&self) -> Option<f64> {
+        let (_, bounds) = self.chain.as_ref().ok()?;
+        bounds.last().copied()
+    }
+
+    fn best(&self) -> f64 {
+        let union = self.union.unwrap_or(0.0);
+        self.of_chain().unwrap_or(0.0).max(union)
+    }
+}
 
 /// The layers of laws by games.
 pub(super) fn of_laws(
@@ -17,127 +53,263 @@ pub(super) fn of_laws(
     question: &Question,
     go_on: &dyn Fn(f64) -> bool,
 ) -> Result<Answer, AnalysisError> {
-    let kind = question.participation.unwrap_or(Participation::Exact);
-    let build = |spec: &Spec, kind: &Participation, share: f64| {
-        closed_loop::build(table, spec, kind, &question.settings, &|_, _| go_on(share))
-    };
-    let own = build(spec, &kind, 0.1)?;
-    let bounds = value::bounds(&own.chain, own.steps);
-    let at_own = bounds.last().copied().unwrap_or(0.0);
-    let (mut proofs, mut exact, mut drawn) = (Vec::new(), Vec::new(), Vec::new());
-    let certain = Losses::certain(spec.uncertainty.loss_gw);
-    let losses = question.losses.as_ref().unwrap_or(&certain);
-    for (index, band) in losses.bands.iter().enumerate() {
-        let share = 0.1 + 0.9 * index as f64 / losses.bands.len() as f64;
-        let mut spec = spec.clone();
-        spec.uncertainty.loss_gw = [band.low_gw, band.high_gw];
-        let of = |kind: &Participation| -> Result<f64, AnalysisError> {
-            let found = build(&spec, kind, share)?;
-            Ok(value::bounds(&found.chain, found.steps)
-                .last()
-                .copied()
-                .unwrap_or(0.0))
-        };
-        let known = of(&Participation::Exact)?;
-        exact.push(known);
-        drawn.push(if kind == Participation::Exact {
-            known
-        } else if question.losses.is_none() {
-            at_own
-        } else {
-            of(&kind)?
-        });
-        proofs.push(proof(*band, known));
-    }
-    let (loss, all) = (losses.mean(&exact), losses.mean(&drawn));
-    let all = if question.losses.is_none() {
-        drawn[0]
-    } else {
-        all
-    };
-    let (tail, dominates) = lost(table, &own, &kind, question, (loss, all));
-    let period_s = f64::from(table.header().tick_ms) * f64::from(table.header().period_ticks) / 1e3;
-    let tick_s = f64::from(table.header().tick_ms) / 1e3;
-    // Two steps of the chain last a period and a tick at least.
-    let over_time = bounds
-        .iter()
-        .enumerate()
-        .skip(2)
-        .step_by(2)
-        .map(|(n, bound)| [(n as f64 / 2.0 - 1.0) * (period_s + tick_s), *bound]);
-    Ok(Answer {
-        lower_bound: all,
-        states: own.chain.states(),
-        transitions: own.chain.transitions(),
-        horizon_s: question.settings.horizon_s,
-        layers: Layers {
-            loss: Layer {
-                lower_bound: if question.losses.is_none() { exact[0] } else { loss },
-                how: "chains with the participation exact".to_owned(),
-            },
-            participation: question.participation.map(|kind| Layer {
-                lower_bound: at_own,
-                how: format!("a chain of {} states at the spec's loss, {kind}{tail}", own.chain.states()),
-            }),
-            noise: None,
-        },
-        dominates,
-        assumptions: vec![
-            losses.assumption.clone(),
-            "the fleet acts as one, at once; the estimate errs within uncertainty.measurement as an adversary likes".to_owned(),
-            format!(
-                "the participation's error is drawn as {kind}, independently, at every decision and in Fixed every {period_s} s"
-            ),
-        ],
-        bands: proofs,
-        rates: Vec::new(),
-        over_time: over_time.collect(),
-        failures: Some(own.failures),
-        reach_hz: Some(own.reach_hz),
-        steps: own.steps,
-        chain: Some(own.chain),
-    })
-}
-
-fn proof(band: LossBand, known: f64) -> BandProof {
-    BandProof {
-        band,
-        participation: None,
-        lowest_hz: None,
-        holds: known == 1.0,
-    }
-}
-
-/// What the bound loses by the draws outside all bins, and what by the rest.
-fn lost(
-    table: &TableView<'_>,
-    own: &ClosedLoop,
-    kind: &Participation,
-    question: &Question,
-    (loss, all): (f64, f64),
-) -> (String, String) {
     let header = table.header();
-    let outside = (1..header.levels).map(|level| {
-        let command = f64::from(header.participation(level).ppm()) / 1e6;
-        let bins = kind.bins(command, question.settings.bin_gw);
-        1.0 - bins.iter().map(|bin| bin.probability).sum::<f64>()
-    });
-    let most = outside.fold(0.0, f64::max).max(0.0);
-    let by_draws = (f64::from(own.steps) * most).min(1.0);
-    let text = format!(
-        "; draws outside all bins are at most {by_draws:.1e} of {} steps",
-        own.steps
-    );
-    let rest = 1.0 - all;
-    let dominates = if 1.0 - loss > 0.5 * rest && rest > 0.0 {
-        format!("what is not certain without any draw: {:.1e}", 1.0 - loss)
+    let laws = Laws {
+        table,
+        spec,
+        question,
+        tick_s: f64::from(header.tick_ms) / 1e3,
+        period_ticks: u32::from(header.period_ticks),
+    };
+    laws.answer(go_on)
+}
+
+impl Laws<'_> {
+    fn answer(&self, go_on: &dyn Fn(f64) -> bool) -> Result<Answer, AnalysisError> {
+        let question = self.question;
+        let certain = Losses::certain(self.spec.uncertainty.loss_gw);
+        let losses = question.losses.as_ref().unwrap_or(&certain);
+        let mut own: Option<OfDraws> = None;
+        if let (Some(kind), Some(_)) = (&question.participation, &question.losses) {
+            let proof = self.proven(certain.bands[0], &|| go_on(0.0))?;
+            own = Some(self.of_draws(kind, &proof, &|| go_on(0.0))?);
+        }
+        let (mut proofs, mut exact, mut drawn) = (Vec::new(), Vec::new(), Vec::new());
+        for (index, band) in losses.bands.iter().enumerate() {
+            let go_on = || go_on(index as f64 / losses.bands.len() as f64);
+            let proof = self.proven(*band, &go_on)?;
+            let holds = f64::from(u8::from(proof.holds));
+            exact.push(holds);
+            drawn.push(match &question.participation {
+                None => holds,
+                Some(kind) => {
+                    let found = self.of_draws(kind, &proof, &go_on)?;
+                    let best = found.best();
+                    own.get_or_insert(found);
+                    best
+                }
+            });
+            proofs.push(proof);
+        }
+        let loss = losses.mean(&exact);
+        // The band of the spec is certain: a mean of one would lose roundings.
+        let [loss, all] = match &question.losses {
+            None => [exact[0], drawn[0]],
+            Some(losses) => [loss, losses.mean(&drawn)],
+        };
+        let mut answer = self.layers(losses, proofs, loss, all);
+        if let (Some(kind), Some(own)) = (&question.participation, own) {
+            self.with_draws(&mut answer, kind, own, loss)?;
+        }
+        Ok(answer)
+    }
+
+    /// What is proven with certainty. The first error is the spec's.
+    fn proven(&self, band: LossBand, go_on: &dyn Fn() -> bool) -> Result<BandProof, AnalysisError> {
+        let known = self.spec.uncertainty.participation;
+        let mut errors = vec![known];
+        if self.question.participation.is_some() {
+            errors.extend(self.question.errors.iter().filter(|error| **error > known));
+            errors.sort_by(f64::total_cmp);
+            errors.dedup();
+        }
+        let horizon_s = self.question.settings.horizon_s;
+        let proof = certain::of_laws(self.table, self.spec, band, &errors, horizon_s, go_on)?;
+        Ok(proof)
+    }
+
+    /// Steps that may begin within the horizon; each has one draw at most.
+    fn steps(&self) -> u32 {
+        let ticks = (self.question.settings.horizon_s / self.tick_s).ceil() as u32;
+        closed_loop::steps_in(ticks, self.period_ticks)
+    }
+
+    fn of_draws(
+        &self,
+        kind: &Participation,
+        proof: &BandProof,
+        go_on: &dyn Fn() -> bool,
+    ) -> Result<OfDraws, AnalysisError> {
+        let within = proof
+            .participation
+            .filter(|_| proof.holds)
+            .and_then(|error| kind.within(error));
+        let union = within.map(|within| {
+            let outside = if within < 1.0 {
+                (1.0 - within).next_up()
+            } else {
+                0.0
+            };
+            all_within(u64::from(self.steps()), outside)
+        });
+        let mut spec = self.spec.clone();
+        spec.uncertainty.loss_gw = [proof.band.low_gw, proof.band.high_gw];
+        let settings = &self.question.settings;
+        let built = closed_loop::build(self.table, &spec, kind, settings, &|_, _| go_on());
+        let chain = match built {
+            Err(ClosedLoopError::Interrupted) => return Err(ClosedLoopError::Interrupted.into()),
+            built => built.map(|built| {
+                let bounds = value::bounds(&built.chain, built.steps);
+                (built, bounds)
+            }),
+        };
+        Ok(OfDraws { union, chain })
+    }
+
+    fn layers(&self, losses: &Losses, bands: Vec<BandProof>, loss: f64, all: f64) -> Answer {
+        Answer {
+            lower_bound: all,
+            states: 0,
+            transitions: 0,
+            horizon_s: self.question.settings.horizon_s,
+            layers: Layers {
+                loss: Layer {
+                    lower_bound: loss,
+                    how: "share of the losses in bands for which all claims are proven".to_owned(),
+                },
+                participation: None,
+                noise: None,
+            },
+            dominates: format!(
+                "losses for which the claims are not proven: {:.1e}",
+                1.0 - loss
+            ),
+            assumptions: vec![
+                losses.assumption.clone(),
+                "the fleet acts as one; the estimate errs within uncertainty.measurement as an adversary likes".to_owned(),
+            ],
+            bands,
+            rates: Vec::new(),
+            over_time: Vec::new(),
+            cut: None,
+            failures: None,
+            reach_hz: None,
+            chain: None,
+            steps: 0,
+        }
+    }
+
+    /// Adds what is known of the drawn participation.
+    fn with_draws(
+        &self,
+        answer: &mut Answer,
+        kind: &Participation,
+        own: OfDraws,
+        loss: f64,
+    ) -> Result<(), AnalysisError> {
+        let best = own.best();
+        let by_chain = own.of_chain();
+        let union = own.union.map(|union| {
+            format!(
+                "a union bound over {} draws of {kind}: {union:.9}",
+                self.steps()
+            )
+        });
+        let mut how: Vec<String> = union.into_iter().collect();
+        let chain = match own.chain {
+            // Nothing else has an answer: what is missing is the answer.
+            Err(error) if own.union.unwrap_or(0.0) <= 0.0 => return Err(error.into()),
+            Err(error) => {
+                how.push(format!("no chain ({error})"));
+                None
+            }
+            Ok(chain) => Some(chain),
+        };
+        let lost_by_draws = match &chain {
+            Some((own, _)) if by_chain == Some(best) => self.outside(kind) * f64::from(own.steps),
+            // Every draw outside counts as lost, and nothing else does.
+            _ => 1.0 - best,
+        };
+        if let Some((own, bounds)) = chain {
+            let left = own.cut.as_ref().map_or(String::new(), |cut| {
+                format!(
+                    ", cut after {} steps: {} nodes were not followed and count as failed",
+                    cut.steps, cut.nodes
+                )
+            });
+            how.push(format!(
+                "a chain of {} states{left}: {:.9}",
+                own.chain.states(),
+                by_chain.unwrap_or(0.0)
+            ));
+            self.with_chain(answer, own, &bounds);
+        }
+        answer.layers.participation = Some(Layer {
+            lower_bound: best,
+            how: format!("at the spec's loss, the better of: {}", how.join("; ")),
+        });
+        answer.assumptions.push(format!(
+            "the participation's error is drawn as {kind}, independently, at every decision and in Fixed every {} s",
+            self.tick_s * f64::from(self.period_ticks)
+        ));
+        answer.dominates = dominates(answer, loss, lost_by_draws);
+        Ok(())
+    }
+
+    fn with_chain(&self, answer: &mut Answer, own: ClosedLoop, bounds: &[f64]) {
+        // Two steps of the chain last a period and a tick at least.
+        let seconds =
+            |steps: usize| (steps / 2) as f64 * self.tick_s * f64::from(self.period_ticks + 1);
+        answer.over_time = bounds
+            .iter()
+            .enumerate()
+            .skip(2)
+            .step_by(2)
+            .map(|(n, bound)| [seconds(n - 2), *bound])
+            .collect();
+        answer.cut = own.cut.map(|cut| {
+            // The bound over T is that of `steps_in` T: two steps are spent on its ends.
+            let whole = (cut.steps.max(2) - 2) as usize / 2 * 2;
+            Cut {
+                steps: cut.steps,
+                nodes: cut.nodes,
+                until_s: seconds(whole),
+                lower_bound: bounds.get(whole + 2).copied().filter(|_| cut.steps >= 2),
+            }
+        });
+        answer.states = own.chain.states();
+        answer.transitions = own.chain.transitions();
+        answer.failures = Some(own.failures);
+        answer.reach_hz = Some(own.reach_hz);
+        answer.steps = own.steps;
+        answer.chain = Some(own.chain);
+    }
+
+    /// Most that the bins of a level leave over.
+    fn outside(&self, kind: &Participation) -> f64 {
+        let header = self.table.header();
+        let outside = (1..header.levels).map(|level| {
+            let command = f64::from(header.participation(level).ppm()) / 1e6;
+            let bins = kind.bins(
+                command,
+                self.question.settings.bin_gw / self.spec.fleet_power_gw(),
+            );
+            1.0 - bins.iter().map(|bin| bin.probability).sum::<f64>()
+        });
+        outside.fold(0.0, f64::max).max(0.0)
+    }
+}
+
+/// What the bound loses most by.
+fn dominates(answer: &Answer, loss: f64, by_draws: f64) -> String {
+    let rest = 1.0 - answer.lower_bound;
+    let by_draws = by_draws.min(rest);
+    if rest > 0.0 && 1.0 - loss > 0.5 * rest {
+        format!(
+            "losses for which the claims are not proven: {:.1e}",
+            1.0 - loss
+        )
     } else if by_draws >= 0.5 * rest {
         format!("draws outside all bins: {by_draws:.1e} of {rest:.1e}")
+    } else if answer.cut.is_some() {
+        format!(
+            "nodes past --nodes-max, which count as failed: {:.1e} of {rest:.1e}",
+            rest - by_draws
+        )
     } else {
         format!(
             "the adversary's choices inside sets and bins: {:.1e} of {rest:.1e}",
             rest - by_draws
         )
-    };
-    (text, dominates)
+    }
 }

@@ -1,5 +1,6 @@
 //! The three layers of a table and a spec, each by itself and all together.
 
+mod certain;
 mod laws;
 mod response;
 
@@ -28,7 +29,7 @@ pub struct Question {
     /// Standard deviation of a normal error of each reading of f \[Hz\], beside what the meter errs
     /// by; nothing: none.
     pub noise_hz: Option<f64>,
-    /// For a response: relative errors for which bands are examined, largest first.
+    /// Relative errors for which bands are examined beside the spec's.
     pub errors: Vec<f64>,
     /// How finely the chain is built.
     pub settings: Settings,
@@ -82,6 +83,19 @@ pub struct Layers {
     pub noise: Option<Layer>,
 }
 
+/// Where a chain was cut: what was not followed counts as failed.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Cut {
+    /// Steps that were followed in full.
+    pub steps: u32,
+    /// Nodes that were reached and not followed.
+    pub nodes: usize,
+    /// Time for which nothing is lost by the cut \[s\].
+    pub until_s: f64,
+    /// The bound over that time; nothing where not even a first step was followed.
+    pub lower_bound: Option<f64>,
+}
+
 /// The answer.
 #[derive(Debug, Clone, Serialize)]
 pub struct Answer {
@@ -103,6 +117,8 @@ pub struct Answer {
     pub bands: Vec<BandProof>,
     /// Yearly rates, where the weights are events a year.
     pub rates: Vec<Rate>,
+    /// Where a chain was cut, if it was.
+    pub cut: Option<Cut>,
     /// Lower bound by time \[s, bound\], from a chain.
     pub over_time: Vec<[f64; 2]>,
     /// What fails in the chain whatever is drawn: decided states, by reason.

@@ -7,6 +7,7 @@ use model::spec::Spec;
 use super::{AnalysisError, Answer, Layer, Layers, Question};
 use crate::bands::{self, Alone};
 use crate::loss::Losses;
+use crate::participation::Drawn;
 use crate::union::{all_within, draws_in};
 
 /// Limits whose yearly rates are shown \[Hz\]: 49.5 and 49.2 Hz.
@@ -109,6 +110,7 @@ pub(super) fn of_response(
         ],
         rates: rates.collect(),
         bands: proofs,
+        cut: None,
         over_time: Vec::new(),
         failures: None,
         reach_hz: None,

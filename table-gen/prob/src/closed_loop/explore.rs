@@ -4,7 +4,9 @@ use std::collections::HashMap;
 
 use rayon::prelude::*;
 
-use super::{ClosedLoop, ClosedLoopError, Ends, Expanded, Failures, Key, Loop, Settings};
+use super::{
+    ClosedLoop, ClosedLoopError, Ends, Expanded, Failures, Key, Loop, Settings, Unfollowed,
+};
 use crate::chain::{Branch, Chain, FAILED, SAFE};
 
 /// Nodes that are expanded between two looks at the clock.
@@ -28,13 +30,13 @@ impl Loop<'_> {
         // Branches of all decided states, and where those of a node begin.
         let (mut rows, mut branches, mut first) = (vec![0usize; 3], Vec::new(), Vec::new());
         let (mut expanded, mut depth, mut layer_end) = (0, 0, known.keys.len());
+        let mut cut = None;
         while expanded < known.keys.len() {
             if expanded == layer_end {
                 depth += 1;
                 layer_end = known.keys.len();
-                // Nodes that are reached later than the last step matter to nobody; their value is
-                // 1 or less there.
-                if depth > steps {
+                // With no step to go every node is worth 1: nobody asks what comes after it.
+                if depth >= steps {
                     break;
                 }
             }
@@ -58,18 +60,32 @@ impl Loop<'_> {
                 }
             }
             expanded = end;
-            if known.keys.len() > settings.nodes_max {
-                return Err(ClosedLoopError::TooLarge {
-                    nodes_max: settings.nodes_max,
-                    steps: depth,
+            // Layers before this one are followed in full, and this one may be.
+            let followed = depth + u32::from(expanded == layer_end);
+            let left = known.keys.len() - expanded;
+            if known.keys.len() > settings.nodes_max && left > 0 && followed < steps {
+                cut = Some(Unfollowed {
+                    steps: followed,
+                    nodes: left,
                 });
+                break;
             }
             if !go_on(expanded, known.keys.len()) {
                 return Err(ClosedLoopError::Interrupted);
             }
         }
-        let states = rows.len() - 1;
-        first.push(states);
+        first.push(rows.len() - 1);
+        // What stands for a node that is not followed: past the last step nothing can fail any
+        // more; before it, the state that fails.
+        let beyond = if cut.is_some() {
+            let set = known.set(&Ends::Failed);
+            let probability = 1.0;
+            branches.push(Branch { probability, set });
+            rows.push(branches.len());
+            (rows.len() - 2) as u32
+        } else {
+            SAFE
+        };
         let mut chain = Chain {
             initial: Vec::new(),
             rows,
@@ -87,8 +103,7 @@ impl Loop<'_> {
                             (Some(from), Some(to)) if node < expanded => {
                                 chain.members.extend(*from as u32..*to as u32);
                             }
-                            // Past the last step.
-                            _ => chain.members.push(SAFE),
+                            _ => chain.members.push(beyond),
                         }
                     }
                 }
@@ -112,6 +127,7 @@ impl Loop<'_> {
             chain,
             steps,
             nodes: known.keys.len(),
+            cut,
             failures,
             reach_hz: self.cover.radius().iter().sum(),
         })

@@ -22,6 +22,11 @@
 //! f may fall below containment at any time, between the ticks too; no law has an entry; I2 is not
 //! reached within `settle_within_s` of leaving I1 (or I2, from Fixed); the draw is outside all
 //! bins.
+//!
+//! # Cut
+//! Where there are more nodes than allowed, one state stands for all that are not followed: it
+//! fails at its first step. Its value is 1 with no step to go and 0 with any, which is a lower
+//! bound whatever comes after it. The chain stays a chain, and its bound a bound for every horizon.
 
 mod event;
 mod expand;
@@ -41,14 +46,14 @@ use crate::decisions::Regions;
 use crate::flight::{Flights, NetPower};
 use crate::modes::Modes;
 pub use crate::modes::ModesError;
-use crate::participation::{Bin, Participation};
+use crate::participation::{Bin, Drawn, Participation};
 
 /// How finely the chain is built.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Settings {
     /// Width of a bin of the fleet's power \[GW\].
     pub bin_gw: f64,
-    /// Most nodes.
+    /// Nodes after which no more are followed; what is not followed counts as failed.
     pub nodes_max: usize,
     /// Time over which the claim is made \[s\].
     pub horizon_s: f64,
@@ -78,14 +83,6 @@ pub enum ClosedLoopError {
         /// What is allowed.
         allowed: &'static str,
     },
-    /// More nodes than allowed.
-    #[error("more than {nodes_max} nodes after {steps} steps: take wider bins or allow more nodes")]
-    TooLarge {
-        /// The limit.
-        nodes_max: usize,
-        /// Steps that were followed.
-        steps: u32,
-    },
     /// It was ended from outside.
     #[error("interrupted")]
     Interrupted,
@@ -104,6 +101,15 @@ pub struct Failures {
     pub not_fitting: usize,
 }
 
+/// What was not followed any more, at [`Settings::nodes_max`].
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Unfollowed {
+    /// Steps that were followed in full: a bound over no more of them loses nothing.
+    pub steps: u32,
+    /// Nodes that were reached and not followed.
+    pub nodes: usize,
+}
+
 /// The chain with what it was built from.
 #[derive(Debug, Clone)]
 pub struct ClosedLoop {
@@ -113,6 +119,8 @@ pub struct ClosedLoop {
     pub steps: u32,
     /// Nodes: pairs of what the firmware remembers and a set.
     pub nodes: usize,
+    /// What was not followed; nothing where every node was.
+    pub cut: Option<Unfollowed>,
     /// What fails for certain.
     pub failures: Failures,
     /// How far the sets reach in f \[Hz\].

@@ -206,14 +206,61 @@ fn what_is_not_covered_is_named() {
         &|_, _| true,
     );
     assert!(matches!(found, Err(ClosedLoopError::Unsupported { .. })));
+}
+
+/// A chain that is cut bounds what the whole one does: the same as far as it was followed, and
+/// never more afterwards.
+#[test]
+fn a_cut_chain_is_a_lower_bound() {
+    let table = TableView::parse(TABLE).unwrap();
     let spec = Spec::load("paper-bi", &[]).unwrap();
-    let few = Settings {
-        nodes_max: 10,
+    let kind = Participation::Gaussian {
+        sigma: 0.002,
+        tail: 3.0,
+    };
+    let chain = |nodes_max| {
+        let settings = Settings {
+            bin_gw: 0.005,
+            nodes_max,
+            ..settings(4.0)
+        };
+        build(&table, &spec, &kind, &settings, &|_, _| true).unwrap()
+    };
+    let whole = chain(200_000);
+    assert_eq!(whole.cut, None);
+    let whole_bounds = value::bounds(&whole.chain, whole.steps);
+    let (mut differs, mut agrees) = (0, 0);
+    for nodes_max in [0, whole.nodes / 8, whole.nodes / 4, whole.nodes / 2] {
+        let few = chain(nodes_max);
+        let cut = few.cut.unwrap();
+        assert!(few.nodes > nodes_max && cut.nodes > 0 && cut.steps < few.steps);
+        let bounds = value::bounds(&few.chain, few.steps);
+        for (steps, (bound, known)) in bounds.iter().zip(&whole_bounds).enumerate() {
+            assert!(bound <= known);
+            if steps as u32 <= cut.steps {
+                // The same products and sums, in the same order.
+                assert_eq!(bound, known, "{nodes_max} {steps}");
+                agrees += 1;
+            }
+            differs += u32::from(bound < known);
+        }
+    }
+    // Cuts that change nothing, or everything, would show nothing.
+    assert!(differs > 0 && agrees > 8, "{differs} {agrees}");
+}
+
+/// The exact participation, over the whole horizon of the spec, with sets that are fine enough: the
+/// chain closes, and what the verifier proves is certain here too.
+#[test]
+fn two_minutes_with_the_participation_exact_are_certain() {
+    let table = TableView::parse(TABLE).unwrap();
+    let spec = Spec::load("paper-bi", &[]).unwrap();
+    let fine = Settings {
+        bin_gw: 0.0025,
         ..settings(120.0)
     };
-    let found = build(&table, &spec, &Participation::Exact, &few, &|_, _| true);
-    assert!(matches!(
-        found,
-        Err(ClosedLoopError::TooLarge { nodes_max: 10, .. })
-    ));
+    let built = build(&table, &spec, &Participation::Exact, &fine, &|_, _| true).unwrap();
+    assert_eq!(built.cut, None);
+    let bounds = value::bounds(&built.chain, built.steps);
+    assert_eq!(bounds.last(), Some(&1.0));
 }

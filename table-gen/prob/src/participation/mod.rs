@@ -1,123 +1,15 @@
 //! The error of the delivered participation, drawn anew each period, cut into bins.
 //!
-//! Under a commanded participation u the fleet delivers u' in `[0, 1]`. A bin is an interval of u'
-//! and a lower bound of the probability that u' falls into it. Bins cover what counts; what they
-//! leave over counts as failure.
+//! A bin is an interval of the delivered participation u' and a lower bound of the probability that
+//! u' falls into it. Bins cover what counts; what they leave over counts as failure.
 
 mod cut;
 
-use std::str::FromStr;
-
 use model::interval::Interval;
+pub use model::participation::{Participation, ParticipationError, TAIL};
 
 use crate::normal;
 use cut::{coins, relative};
-
-/// How the delivered participation is drawn.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Participation {
-    /// Exactly what was commanded.
-    Exact,
-    /// `u (1 + e)`, e uniform within ± this.
-    Uniform {
-        /// Largest relative error.
-        bound: f64,
-    },
-    /// `u (1 + e)`, e normal with this deviation, given that |e| is at most the bound.
-    Truncated {
-        /// Standard deviation, relative.
-        sigma: f64,
-        /// Largest relative error.
-        bound: f64,
-    },
-    /// `u (1 + e)`, e normal with this deviation. Errors past `tail` deviations count as failure.
-    Gaussian {
-        /// Standard deviation, relative.
-        sigma: f64,
-        /// Deviations that are followed.
-        tail: f64,
-    },
-    /// Each of so many chargers responds in full with probability u, on its own: the mean of as
-    /// many coins.
-    Bernoulli {
-        /// Chargers.
-        chargers: u32,
-    },
-}
-
-/// Deviations that are followed where nothing else is asked for.
-pub const TAIL: f64 = 5.0;
-/// Most chargers of a fleet of coins.
-const CHARGERS_MAX: u32 = 10_000_000;
-
-/// Why a distribution cannot be read.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error(
-    "participation = {found}: allowed are exact, uniform:BOUND, gaussian:SIGMA[,DEVIATIONS], truncated:SIGMA,BOUND \
-     (relative, above 0, at most 1; deviations 1 to 8) and bernoulli:CHARGERS (1 to {CHARGERS_MAX})"
-)]
-pub struct ParticipationError {
-    /// What was given.
-    pub found: String,
-}
-
-/// As it is read.
-impl std::fmt::Display for Participation {
-    fn fmt(&self, out: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        match self {
-            Self::Exact => write!(out, "exact"),
-            Self::Uniform { bound } => write!(out, "uniform:{bound}"),
-            Self::Truncated { sigma, bound } => write!(out, "truncated:{sigma},{bound}"),
-            Self::Gaussian { sigma, tail } => write!(out, "gaussian:{sigma},{tail}"),
-            Self::Bernoulli { chargers } => write!(out, "bernoulli:{chargers}"),
-        }
-    }
-}
-
-impl FromStr for Participation {
-    type Err = ParticipationError;
-    fn from_str(text: &str) -> Result<Self, Self::Err> {
-        let wrong = || ParticipationError {
-            found: text.to_owned(),
-        };
-        let (kind, rest) = text.split_once(':').unwrap_or((text, ""));
-        let numbers: Vec<f64> = match rest {
-            "" => Vec::new(),
-            rest => rest
-                .split(',')
-                .map(|number| number.trim().parse().map_err(|_| wrong()))
-                .collect::<Result<_, _>>()?,
-        };
-        let share = |value: f64| value > 0.0 && value <= 1.0;
-        let found = match (kind, numbers.as_slice()) {
-            ("exact", []) => Self::Exact,
-            ("uniform", [bound]) if share(*bound) => Self::Uniform { bound: *bound },
-            ("gaussian", [sigma]) if share(*sigma) => Self::Gaussian {
-                sigma: *sigma,
-                tail: TAIL,
-            },
-            ("gaussian", [sigma, tail]) if share(*sigma) && (1.0..=8.0).contains(tail) => {
-                Self::Gaussian {
-                    sigma: *sigma,
-                    tail: *tail,
-                }
-            }
-            ("truncated", [sigma, bound]) if share(*sigma) && share(*bound) => Self::Truncated {
-                sigma: *sigma,
-                bound: *bound,
-            },
-            ("bernoulli", [n])
-                if *n >= 1.0 && *n <= f64::from(CHARGERS_MAX) && n.fract() == 0.0 =>
-            {
-                Self::Bernoulli {
-                    chargers: *n as u32,
-                }
-            }
-            _ => return Err(wrong()),
-        };
-        Ok(found)
-    }
-}
 
 /// A piece of the distribution.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -128,11 +20,19 @@ pub struct Bin {
     pub delivered: Interval,
 }
 
-impl Participation {
+/// What a bound asks of a distribution.
+pub trait Drawn {
     /// Lower bound of the probability of a relative error within ± r of a command of 1 or less: for
     /// proofs that hold for any error within r. Nothing for a fleet of coins, whose relative error
     /// depends on the command.
-    pub fn within(&self, r: f64) -> Option<f64> {
+    fn within(&self, r: f64) -> Option<f64>;
+
+    /// The bins under a command, each at most `width` of participation wide.
+    fn bins(&self, command: f64, width: f64) -> Vec<Bin>;
+}
+
+impl Drawn for Participation {
+    fn within(&self, r: f64) -> Option<f64> {
         let inside = |z: f64| (1.0 - normal::outside(z)).next_down().max(0.0);
         match *self {
             Self::Exact => Some(1.0),
@@ -147,8 +47,7 @@ impl Participation {
         }
     }
 
-    /// The bins under a command, each at most `width` of participation wide.
-    pub fn bins(&self, command: f64, width: f64) -> Vec<Bin> {
+    fn bins(&self, command: f64, width: f64) -> Vec<Bin> {
         let all = |delivered| {
             vec![Bin {
                 probability: 1.0,
@@ -264,20 +163,5 @@ mod tests {
         let off = |bin: &&Bin| (bin.delivered.mid() / 0.3 - 1.0).abs() < 0.05;
         let inside: f64 = bins.iter().filter(off).map(|bin| bin.probability).sum();
         assert!((1.0 - inside) * 120.0 < 3.7e-4);
-    }
-
-    #[test]
-    fn what_is_no_distribution_is_refused() {
-        for text in [
-            "",
-            "gauss:0.05",
-            "gaussian:",
-            "uniform:0",
-            "uniform:nan",
-            "gaussian:0.05,9",
-            "bernoulli:0.5",
-        ] {
-            assert!(text.parse::<Participation>().is_err(), "{text}");
-        }
     }
 }

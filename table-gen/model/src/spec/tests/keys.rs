@@ -39,7 +39,12 @@ fn bad_numbers(doc: &KeyDoc) -> Vec<String> {
                 .map(|n| n.to_string())
                 .to_vec();
         }
-        Allowed::Flag | Allowed::Choice(_) | Allowed::Name | Allowed::OptionalFormula => {
+        Allowed::Flag
+        | Allowed::Choice(_)
+        | Allowed::Name
+        | Allowed::OptionalFormula
+        | Allowed::OptionalParticipation
+        | Allowed::OptionalLoss => {
             return Vec::new();
         }
     };
@@ -73,6 +78,10 @@ fn the_key_table_and_the_structs_have_the_same_keys() {
         "plant.governor.rate_gw_per_s=0.2",
         "plant.governor.lower_gw=-1",
         "plant.governor.upper_gw=1",
+        "chance.loss=gb-synthetic",
+        "chance.participation=exact",
+        "chance.draw_interval_s=1.5",
+        "chance.noise_hz=0.001",
     ];
     let spec = super::with(&bands).unwrap();
     let text = toml::to_string(&spec).unwrap();
@@ -95,6 +104,7 @@ fn the_field_docs_agree_with_the_key_table() {
         include_str!("../preference.rs"),
         include_str!("../meter.rs"),
         include_str!("../charger.rs"),
+        include_str!("../chance.rs"),
     ]
     .concat()
     // Long lines are wrapped.
@@ -170,7 +180,10 @@ fn every_key_refuses_every_other_type() {
                 Allowed::Flag => value == "true",
                 // An override's text serves as a name whatever its type.
                 Allowed::Choice(_) => value == "\"text\"",
-                Allowed::Name | Allowed::OptionalFormula => continue,
+                Allowed::Name
+                | Allowed::OptionalFormula
+                | Allowed::OptionalParticipation
+                | Allowed::OptionalLoss => continue,
             };
             if !fits {
                 let message = refused(&[&format!("{}={value}", doc.key)], doc.key);

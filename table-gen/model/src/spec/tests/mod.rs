@@ -139,8 +139,12 @@ fn shipped_specs_state_every_key() {
             .iter()
             .filter(|doc| !matches!(doc.allowed, Allowed::OptionalNumbers { .. }))
             .map(|doc| doc.key.to_owned())
-            // The laboratory's cars are ideal unless a spec says otherwise.
-            .filter(|key| !key.starts_with("charger.") && !key.starts_with("plant.governor."))
+            // The laboratory's cars are ideal unless a spec says otherwise, governors have no
+            // limits, and nothing is drawn.
+            .filter(|key| {
+                let sections = ["charger.", "plant.governor.", "chance."];
+                !sections.iter().any(|section| key.starts_with(section))
+            })
             .filter(|key| ![FORMULA, CHANGES, RECOVERY].contains(&key.as_str()))
             .filter(|key| is_response || !only_of_responses(key))
             .collect();
@@ -248,13 +252,19 @@ fn the_hash_changes_with_every_key() {
         .map(|text| text.split('=').next().unwrap())
         .collect();
     let all: Vec<&str> = reference().iter().map(|doc| doc.key).collect();
-    // The laboratory's cars are no part of what a table was made for.
-    let (cars, rest): (Vec<&str>, Vec<&str>) =
-        all.iter().partition(|key| key.starts_with("charger."));
+    // The laboratory's cars and what is drawn are no part of what a table was made for.
+    let (apart, rest): (Vec<&str>, Vec<&str>) = all
+        .iter()
+        .partition(|key| key.starts_with("charger.") || key.starts_with("chance."));
     assert_eq!(changed, rest);
-    assert_eq!(cars.len(), 10);
-    let slow = with(&["charger.dead_time_s=[0, 6]", "charger.draw=[0.5, 1]"]);
-    assert_eq!(slow.unwrap().hash(), with(&[]).unwrap().hash());
+    assert_eq!(apart.len(), 14);
+    let other = with(&[
+        "charger.dead_time_s=[0, 6]",
+        "charger.draw=[0.5, 1]",
+        "chance.participation=gaussian:0.05",
+        "chance.loss=gb-synthetic",
+    ]);
+    assert_eq!(other.unwrap().hash(), with(&[]).unwrap().hash());
 
     let mut hashes = BTreeSet::from([with(&[]).unwrap().hash()]);
     for change in changes {
