@@ -77,6 +77,16 @@ fn the_spec_says_what_is_drawn_and_a_cut_chain_says_so() {
     let union = json(&[&drawn[..], &["--errors", "0.0005", "--nodes-max", "10"]].concat());
     assert_eq!(union["lower_bound"].as_f64(), Some(1.0));
     assert!(union["cut"]["nodes"].as_u64().unwrap() > 0);
+    let dir = tempfile::tempdir().unwrap();
+    let svg = dir.path().join("lost.svg");
+    let normal = ["--participation", "gaussian:0.0001", "--errors", "0.0005"];
+    let drawn_as = ["--nodes-max", "10", "--json", "--figure"];
+    let asked = [&normal[..], &drawn_as, &[svg.to_str().unwrap()]].concat();
+    // Five deviations: 152 draws, each outside with 5.74e-7.
+    let bound = json(&asked)["lower_bound"].as_f64().unwrap();
+    assert!((1.0 - bound - 152.0 * 5.733e-7).abs() < 1e-8, "{bound}");
+    let svg = std::fs::read_to_string(svg).unwrap();
+    assert!(svg.contains("gaussian:0.0001,5 within 0.0500 %") && svg.contains("chain"));
     let cut = json(&[&drawn[..], &["--nodes-max", "10"]].concat());
     assert_eq!(cut["lower_bound"].as_f64(), Some(0.0));
     let option = json(&[&drawn[..], &["--participation", "exact"]].concat());

@@ -15,7 +15,7 @@
 //! | choices | 2,000 states at random, 4 branches of up to 5 members, 40 steps |
 //! | large | 100,000 states at random, 8 branches of up to 3 members, 120 steps |
 //! | paper-bi | the first two seconds of a flashed table, the participation normal with 0.2 % |
-//! | paper-bi, cut | two minutes of it, cut at 40,000 nodes |
+//! | paper-bi-cut | two minutes of it, cut at 20,000 nodes, over the steps that were followed |
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on fails")]
 
 use std::fs::File;
@@ -56,12 +56,14 @@ fn agrees_with_storm() {
         std::env::var_os("HOLDFAST_PYTHON").expect("HOLDFAST_PYTHON names a Python with stormpy");
     let mut coin = ChainBuilder::new();
     coin.state(&[(0.75, vec![2])]).unwrap();
-    let (paper, steps) = paper_bi();
+    let (paper, steps) = paper_bi(2.0, 200_000);
+    let (cut, followed) = paper_bi(120.0, 20_000);
     let instances = [
         ("coin", coin.finish(&[2]).unwrap(), 10),
         ("choices", random(2_000, [4, 5], 1).unwrap(), 40),
         ("large", random(100_000, [8, 3], 2).unwrap(), 120),
         ("paper-bi", paper, steps),
+        ("paper-bi-cut", cut, followed),
     ];
     let dir = std::env::temp_dir().join(format!("holdfast-storm-{}", std::process::id()));
     std::fs::create_dir_all(&dir).unwrap();
@@ -91,8 +93,8 @@ fn agrees_with_storm() {
     assert!(status.success());
 }
 
-/// The first two seconds of paper-bi.
-fn paper_bi() -> (Chain, u32) {
+/// So many seconds of paper-bi, and the steps for which nothing is lost by a cut.
+fn paper_bi(horizon_s: f64, nodes_max: usize) -> (Chain, u32) {
     let bytes = include_bytes!("../../../firmware/tables/paper-bi.bin");
     let table = TableView::parse(bytes).unwrap();
     let spec = Spec::load("paper-bi", &[]).unwrap();
@@ -102,11 +104,12 @@ fn paper_bi() -> (Chain, u32) {
     };
     let settings = Settings {
         bin_gw: 0.005,
-        nodes_max: 200_000,
-        horizon_s: 2.0,
+        nodes_max,
+        horizon_s,
     };
     let built = closed_loop::build(&table, &spec, &kind, &settings, &|_, _| true).unwrap();
-    (built.chain, built.steps)
+    let steps = built.cut.map_or(built.steps, |cut| cut.steps);
+    (built.chain, steps)
 }
 
 /// States with so many branches of at most so many members; a ten-thousandth of each state's weight

@@ -28,6 +28,7 @@ mod ocpp;
 mod output;
 mod plot;
 mod prob;
+mod prob_figure;
 mod progress;
 #[cfg(feature = "mpi")]
 mod ranks;

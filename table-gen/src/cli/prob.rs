@@ -9,11 +9,12 @@ use ::prob::loss::Losses;
 use ::prob::participation::Participation;
 use ::prob::sampled::{RUNS_MAX, Runs, Sampled};
 use firmware::table::TableView;
+use lab::report::chart;
 use serde::Serialize;
 use verify::VerifyError;
 
 use super::files::write_one;
-use super::{Failure, Overrides, output, progress};
+use super::{Failure, Overrides, output, prob_figure, progress};
 use model::spec::Spec;
 
 /// Time over which the promise is bounded where the spec has no horizon \[s\].
@@ -67,6 +68,9 @@ pub(super) struct ProbArgs {
     /// Write the chain as PRISM's explicit files BASE.tra and BASE.lab
     #[arg(long, value_name = "BASE")]
     prism: Option<PathBuf>,
+    /// Draw what may be lost over the horizon, for several sizes of the error, as SVG
+    #[arg(long, value_name = "FILE")]
+    figure: Option<PathBuf>,
     /// Runs of the same process beside the bound (laws by games)
     #[arg(long, value_name = "N")]
     runs: Option<u32>,
@@ -95,6 +99,11 @@ pub(super) fn run(args: &ProbArgs) -> Result<(), Failure> {
     let bar = progress::share("prob");
     let answer = analysis::answer(&table, &spec, &question, &|done| bar(done)).map_err(failure)?;
     exported(args, &spec, &answer)?;
+    if let Some(path) = &args.figure {
+        let figure = prob_figure::figure(table.header(), &question, &answer);
+        let drawn = chart::svg(&figure).map_err(Failure::bad)?;
+        write_one(path, chart::with_style(&drawn).as_bytes())?;
+    }
     let simulated = simulated(args, &spec, &table, &question)?;
     if args.output.json {
         return output::json(&ProbReport {

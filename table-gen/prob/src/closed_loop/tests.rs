@@ -229,10 +229,15 @@ fn a_cut_chain_is_a_lower_bound() {
     let whole = chain(200_000);
     assert_eq!(whole.cut, None);
     let whole_bounds = value::bounds(&whole.chain, whole.steps);
-    let (mut differs, mut agrees) = (0, 0);
-    for nodes_max in [0, whole.nodes / 8, whole.nodes / 4, whole.nodes / 2] {
+    let (mut cuts, mut differs, mut agrees) = (0, 0, 0);
+    for nodes_max in [0, whole.nodes / 64, whole.nodes / 16, whole.nodes / 4] {
         let few = chain(nodes_max);
-        let cut = few.cut.unwrap();
+        // A limit that is passed in the last layer alone cuts nothing.
+        let Some(cut) = few.cut else {
+            assert_eq!(few.chain, whole.chain);
+            continue;
+        };
+        cuts += 1;
         assert!(few.nodes > nodes_max && cut.nodes > 0 && cut.steps < few.steps);
         let bounds = value::bounds(&few.chain, few.steps);
         for (steps, (bound, known)) in bounds.iter().zip(&whole_bounds).enumerate() {
@@ -246,7 +251,10 @@ fn a_cut_chain_is_a_lower_bound() {
         }
     }
     // Cuts that change nothing, or everything, would show nothing.
-    assert!(differs > 0 && agrees > 8, "{differs} {agrees}");
+    assert!(
+        cuts > 1 && differs > 0 && agrees > 4,
+        "{cuts} {differs} {agrees}"
+    );
 }
 
 /// The exact participation, over the whole horizon of the spec, with sets that are fine enough: the
