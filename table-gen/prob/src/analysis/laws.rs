@@ -207,8 +207,8 @@ impl Laws<'_> {
         });
         let mut how: Vec<String> = union.into_iter().collect();
         let chain = match own.chain {
-            // Nothing else has an answer: what is missing is the answer.
-            Err(error) if own.union.unwrap_or(0.0) <= 0.0 => return Err(error.into()),
+            // Neither bound exists: what is missing is the answer.
+            Err(error) if own.union.is_none() => return Err(error.into()),
             Err(error) => {
                 how.push(format!("no chain ({error})"));
                 None
