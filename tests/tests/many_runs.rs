@@ -164,6 +164,7 @@ fn fleet_of(instances: usize, failed_share: f64) -> FleetConfig {
         delay_s: [0.0, 0.0],
         lag_s: [0.0, 0.0],
         failed_share,
+        hostile_share: 0.0,
         outages_per_hour: 20.0,
         outage_s: 2.0,
         spread_clocks: true,

@@ -60,6 +60,7 @@ fn find() -> Findings {
         claims: Vec::new(),
         reachable_cells: 0,
         counterexample: None,
+        hostile_share: None,
         spec_hash: String::new(),
         table_spec_hash: String::new(),
         table_sha256: String::new(),

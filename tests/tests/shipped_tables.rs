@@ -11,8 +11,9 @@ use tests::testing::{built, shipped};
 /// Variants of `gb-bi`. Their proofs are those of the same verifier with other
 /// numbers, and take a minute and a half of processor time each: here the verdict beside the table
 /// must be about its bytes and this spec. `build NAME` proves them anew.
-const VARIANTS: [&str; 5] = [
+const VARIANTS: [&str; 6] = [
     "gb-bi-ade7953",
+    "gb-bi-slow",
     "gb-low-inertia",
     "gb-uni",
     "gb-uni-ade7953",

@@ -68,6 +68,13 @@ fn specs() -> Vec<Spec> {
                 "uncertainty.loss_gw=[-1.0,3.0]",
             ],
         ),
+        load(
+            "paper-bi",
+            &[
+                "uncertainty.participation=0.1",
+                "uncertainty.hostile_share=0.05",
+            ],
+        ),
         load("paper-bi", &robust),
     ]
 }
@@ -102,7 +109,11 @@ impl<'t> Trial<'t> {
 
     fn net_power(&self, random: &mut Random, level: usize) -> f64 {
         let u = self.spec.input.value(level);
-        let delivered = u * (1.0 + self.spec.uncertainty.participation * random.extreme());
+        let honest = u * (1.0 + self.spec.uncertainty.participation * random.extreme());
+        // Hostile chargers give nothing, everything or anything between.
+        let hostile = self.spec.uncertainty.hostile_share.unwrap_or(0.0);
+        let given = 0.5 + 0.5 * random.extreme();
+        let delivered = (1.0 - hostile) * honest + hostile * given;
         let [low, high] = self.spec.uncertainty.loss_gw.map(|w| w * 1e6);
         let loss = 0.5 * (low + high) + 0.5 * (high - low) * random.extreme();
         self.fleet * delivered.min(1.0) - loss

@@ -9,6 +9,8 @@
 //! | [`propagator`] | the equations | the exact step in plain numbers |
 //! | [`governor`], [`stepper`] | governors with limits | the same, not linear |
 //! | [`interval`], [`flow`] | the equations | enclosures of the flow over a time |
+//! | [`exponential`] | exp and ln | enclosures |
+//! | [`independence`] | independent chargers | how far their mean is off, and how likely |
 //! | [`participation`] | a text | how the delivered participation is drawn |
 //! | [`table_fields`] | a spec | plant, droop, hypotheses and response in a table's whole numbers |
 //! | [`grid_shape`] | a grid of cells | cell numbers |
@@ -18,10 +20,12 @@
 #![forbid(unsafe_code)]
 
 pub mod budget;
+pub mod exponential;
 pub mod flow;
 pub mod governor;
 pub mod grid_shape;
 pub mod hex;
+pub mod independence;
 pub mod interval;
 pub mod logic;
 pub mod participation;

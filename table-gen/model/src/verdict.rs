@@ -22,6 +22,9 @@ pub struct Verdict {
     pub reachable_cells: u64,
     /// For a claim that does not hold: how it fails.
     pub counterexample: Option<Counterexample>,
+    /// Share of the chargers that was assumed to do as it likes; absent: none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub hostile_share: Option<f64>,
     /// Hash of the spec (as in the table's header), hexadecimal.
     pub spec_hash: String,
     /// Hash of the spec that the table was made for, hexadecimal.

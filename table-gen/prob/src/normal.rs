@@ -4,6 +4,7 @@
 //! terms are positive, so intervals lose a few roundings only. Once a term is less than half of the
 //! one before it, the rest of the series is at most the last term.
 
+use model::exponential::exp;
 use model::interval::Interval;
 
 /// Past this, `1 - Φ(z)` is below 6.3e-16; the enclosure is `[1 - 1e-15, 1]`.
@@ -84,28 +85,6 @@ fn density(square: Interval) -> Interval {
         high: (2.0 * pi.high).sqrt().next_up(),
     };
     Interval::ONE / (exp(square * Interval::point(0.5)) * root)
-}
-
-/// exp(y) for y >= 0: a series at y / 2^k <= 1/2, squared k times.
-fn exp(y: Interval) -> Interval {
-    let halvings = (y.high.max(0.5) / 0.5).log2().ceil() as u32;
-    // A power of two divides exactly.
-    let scale = Interval::point(0.5f64.powi(halvings as i32));
-    let small = y * scale;
-    let (mut term, mut sum) = (Interval::ONE, Interval::ONE);
-    for n in 1..=20u32 {
-        term = term * small / Interval::point(f64::from(n));
-        sum = sum + term;
-    }
-    let rest = Interval {
-        low: 0.0,
-        high: term.high,
-    };
-    let mut out = sum + rest;
-    for _ in 0..halvings {
-        out = out * out;
-    }
-    out
 }
 
 fn clamped(value: Interval) -> Interval {

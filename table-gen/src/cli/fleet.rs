@@ -209,6 +209,7 @@ fn print(report: &FleetReport<'_>) {
     let mut table = output::table(&["fleet", "value"]);
     let rows = [
         ("failed chargers", output::grouped(fleet.failed)),
+        ("hostile chargers", output::grouped(fleet.hostile)),
         (
             "response off the told one",
             format!(

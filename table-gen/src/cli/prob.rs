@@ -100,7 +100,8 @@ pub(super) fn run(args: &ProbArgs) -> Result<(), Failure> {
     let answer = analysis::answer(&table, &spec, &question, &|done| bar(done)).map_err(failure)?;
     exported(args, &spec, &answer)?;
     if let Some(path) = &args.figure {
-        let figure = prob_figure::figure(table.header(), &question, &answer);
+        let absolute = spec.uncertainty.participation_absolute;
+        let figure = prob_figure::figure(table.header(), absolute, &question, &answer);
         let drawn = chart::svg(&figure).map_err(Failure::bad)?;
         write_one(path, chart::with_style(&drawn).as_bytes())?;
     }

@@ -4,7 +4,7 @@
 use ::prob::analysis::{Answer, Question};
 use ::prob::closed_loop::steps_in;
 use ::prob::participation::{Drawn, Participation};
-use ::prob::union::{all_within, draws_in};
+use ::prob::union::draws_in;
 use firmware::table::Header;
 use lab::report::figure::{Axis, Curve, Figure};
 use lab::report::palette::Colour;
@@ -23,8 +23,14 @@ const BESIDE: [(f64, Colour); 5] = [
 ];
 
 /// The figure: a curve for the chain, if there is one, and one for each size of the error by the
-/// union of draws, if an error is proven.
-pub(super) fn figure(header: &Header, question: &Question, answer: &Answer) -> Figure {
+/// union of draws, if an error is proven. `absolute` is the error of the delivery that the proof has
+/// beside the relative one.
+pub(super) fn figure(
+    header: &Header,
+    absolute: f64,
+    question: &Question,
+    answer: &Answer,
+) -> Figure {
     let mut curves = Vec::new();
     if !answer.over_time.is_empty() {
         curves.push(Curve {
@@ -45,17 +51,9 @@ pub(super) fn figure(header: &Header, question: &Question, answer: &Answer) -> F
         .reduce(f64::min);
     if let (Some(error), Some(kind)) = (proven, &question.participation) {
         for (kind, colour) in beside(kind) {
-            let Some(within) = kind.within(error) else {
-                continue;
-            };
-            let outside = if within < 1.0 {
-                (1.0 - within).next_up()
-            } else {
-                0.0
-            };
             let points = (0..=POINTS).map(|i| {
                 let time = answer.horizon_s * f64::from(i) / f64::from(POINTS);
-                let bound = all_within(draws(header, question, time), outside);
+                let bound = kind.all_within(draws(header, question, time), error, absolute);
                 (time, lost(bound))
             });
             curves.push(Curve {

@@ -21,6 +21,10 @@ pub(super) struct VerifyArgs {
     overrides: Overrides,
     #[command(flatten)]
     output: super::OutputArgs,
+    /// Examine the table against a fleet of which this share does as it likes, the opposite or
+    /// nothing; the table stays the one of SPEC (0 to 1)
+    #[arg(long, value_name = "X", allow_negative_numbers = true)]
+    hostile_share: Option<f64>,
     /// Also write the verdict to this file
     #[arg(long, value_name = "FILE")]
     verdict: Option<PathBuf>,
@@ -34,7 +38,12 @@ pub(super) fn run(args: &VerifyArgs) -> Result<(), Failure> {
         Failure::BadInput(format!("{}: {error}", path.display()))
     };
     let bytes = std::fs::read(&args.table).map_err(|error| fail(&args.table, error))?;
-    let verdict = examine(&bytes, &spec)?;
+    let mut assumed = spec.clone();
+    if args.hostile_share.is_some() {
+        assumed.uncertainty.hostile_share = args.hostile_share;
+        assumed.validate("--hostile-share")?;
+    }
+    let verdict = examine_assuming(&bytes, &spec, &assumed)?;
     if let Some(path) = &args.verdict {
         let text = serde_json::to_string_pretty(&verdict).map_err(Failure::bad)?;
         std::fs::write(path, text).map_err(|error| fail(path, error))?;
@@ -49,13 +58,18 @@ pub(super) fn run(args: &VerifyArgs) -> Result<(), Failure> {
 
 /// Verifies with progress on stderr.
 pub(super) fn examine(bytes: &[u8], spec: &Spec) -> Result<Verdict, Failure> {
+    examine_assuming(bytes, spec, spec)
+}
+
+/// The same for a fleet that is worse than the spec's.
+fn examine_assuming(bytes: &[u8], spec: &Spec, assumed: &Spec) -> Result<Verdict, Failure> {
     let bar = progress::share("verify");
-    let mut verdict =
-        verify::verify(bytes, spec, &|done| bar(done)).map_err(|error| match error {
-            VerifyError::Interrupted => Failure::No(error.to_string()),
-            _ => Failure::bad(error),
-        })?;
-    witness::refute(&mut verdict, bytes, spec)
+    let verdict = verify::verify_assuming(bytes, spec, assumed, &|done| bar(done));
+    let mut verdict = verdict.map_err(|error| match error {
+        VerifyError::Interrupted => Failure::No(error.to_string()),
+        _ => Failure::bad(error),
+    })?;
+    witness::refute(&mut verdict, bytes, assumed)
         .map_err(|error| Failure::bad(VerifyError::Table(error)))?;
     Ok(verdict)
 }
@@ -87,6 +101,12 @@ pub(super) fn print(verdict: &Verdict) {
         verdict.method,
         output::grouped(verdict.reachable_cells as usize),
     ));
+    if let Some(share) = verdict.hostile_share {
+        output::line(format_args!(
+            "assumed: {} % of the chargers do as they like",
+            100.0 * share
+        ));
+    }
     let mut table = output::table(&["claim", "holds", "bound", "limit", "unit"]);
     let number = |value: Option<f64>| value.map_or_else(|| "-".to_owned(), |v| format!("{v:.4}"));
     for claim in &verdict.claims {

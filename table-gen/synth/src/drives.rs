@@ -8,14 +8,17 @@ use model::spec::Spec;
 /// Micro-units in a unit.
 pub const MICRO: f64 = firmware::units::MICRO as f64;
 
-/// Net power `P u' - w` \[µGW\] under a commanded participation: u' within the participation error,
-/// at most the whole fleet, and w within its band.
+/// Net power `P u' - w` \[µGW\] under a commanded participation: u' within the participation error
+/// and what the hostile share may add or leave away, at most the whole fleet, and w within its
+/// band.
 pub fn net_power(spec: &Spec, level: usize) -> Interval {
     let fleet = Interval::point(spec.fleet_power_gw()) * Interval::point(MICRO);
     let u = Interval::point(spec.input.value(level));
     let error = Interval::point(spec.uncertainty.participation);
-    let low = (u * (Interval::ONE - error)).low.max(0.0);
-    let high = (u * (Interval::ONE + error)).high.min(1.0);
+    let hostile = Interval::point(spec.uncertainty.hostile());
+    let honest = u * (Interval::ONE - hostile);
+    let low = (honest * (Interval::ONE - error)).low.max(0.0);
+    let high = (honest * (Interval::ONE + error) + hostile).high.min(1.0);
     let [loss_low, loss_high] = spec.uncertainty.loss_gw;
     let loss = Interval::hull(loss_low, loss_high) * Interval::point(MICRO);
     fleet * Interval::hull(low, high) - loss

@@ -10,6 +10,9 @@ use model::verdict::{Claim, ClaimName};
 /// What the claims are read off.
 pub(super) struct Findings<'a> {
     pub(super) table: &'a TableView<'a>,
+    /// The spec that the table is of.
+    pub(super) made_for: &'a Spec,
+    /// What is assumed and asked.
     pub(super) spec: &'a Spec,
     pub(super) model: &'a Model,
     pub(super) tally: &'a Outcome,
@@ -35,7 +38,10 @@ pub(super) fn header(table: &TableView<'_>, spec: &Spec) -> Claim {
 impl Findings<'_> {
     /// All claims, in the order in which a reader asks.
     pub(super) fn claims(&self) -> Vec<Claim> {
-        let mut claims = vec![header(self.table, self.spec), dispatch::claim(self.spec)];
+        let mut claims = vec![
+            header(self.table, self.made_for),
+            dispatch::claim(self.spec),
+        ];
         claims.extend(image::claim(self.table, self.spec));
         claims.extend([
             self.containment(),

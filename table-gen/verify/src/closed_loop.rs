@@ -143,24 +143,48 @@ fn limit_micro(hz: f64) -> f64 {
     micro(hz).high
 }
 
-/// `P u' - w` \[kW\] for a commanded participation \[ppm\]: u' within the participation error, at
-/// most the whole fleet, w within its band.
+/// `P u' - w` \[kW\] for a commanded participation u \[ppm\], w within its band.
+///
+/// Of N chargers a share σ is hostile and gives anything from 0 to 1 each; the mean of the others
+/// is within a relative error δ of u. So u' lies between `(1 - σ)(1 - δ) u` and `(1 - σ)(1 + δ) u +
+/// σ`, and is at most 1. With u = 0 that is anything from nothing to σ: No control too.
 fn net_power(spec: &Spec, ppm: u32) -> Interval {
     let fleet = micro(spec.fleet_power_gw());
     let loss = micro(spec.uncertainty.loss_gw[0]).join(micro(spec.uncertainty.loss_gw[1]));
     let commanded = fleet * Interval::point(f64::from(ppm)) / Interval::point(MICRO);
-    if spec.uncertainty.participation == 0.0 {
+    let hostile = spec.uncertainty.hostile();
+    if spec.uncertainty.participation == 0.0 && hostile == 0.0 {
         return commanded - loss;
     }
     let error = Interval::point(spec.uncertainty.participation);
-    let low = (commanded * (Interval::ONE - error)).low.max(0.0);
-    let high = (commanded * (Interval::ONE + error)).high.min(fleet.high);
+    let hostile = Interval::point(hostile);
+    let honest = commanded * (Interval::ONE - hostile);
+    let low = (honest * (Interval::ONE - error)).low.max(0.0);
+    let high = (honest * (Interval::ONE + error) + hostile * fleet)
+        .high
+        .min(fleet.high);
     Interval::hull(low, high) - loss
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_hostile_share_adds_and_leaves_away() {
+        let set = ["uncertainty.hostile_share=0.1".to_owned()];
+        let spec = Spec::load("paper-bi", &set).unwrap();
+        // 1.4 GW against a loss of 2 GW: 10 % of it at rest, and all but 10 % when all are told to.
+        for (ppm, low, high) in [
+            (0, -2_000_000.0, -1_860_000.0),
+            (500_000, -1_370_000.0, -1_230_000.0),
+            (1_000_000, -740_000.0, -600_000.0),
+        ] {
+            let found = net_power(&spec, ppm);
+            assert!(found.low <= low && found.high >= high, "{ppm} {found:?}");
+            assert!(found.low > low - 1e-3 && found.high < high + 1e-3);
+        }
+    }
 
     #[test]
     fn a_limit_of_the_governors_is_named_and_a_linear_plant_is_examined() {

@@ -106,10 +106,35 @@ pub fn verify(
     spec: &Spec,
     go_on: &dyn Fn(f64) -> bool,
 ) -> Result<Verdict, VerifyError> {
-    let table = TableView::parse(bytes).map_err(VerifyError::Table)?;
-    if table.header().always_on || spec.preference.always_on {
-        return of_response(&table, spec, go_on);
+    verify_assuming(bytes, spec, spec, go_on)
+}
+
+/// The same against a fleet that is worse than the one that the table was made for: `assumed` is
+/// the spec but for `uncertainty.hostile_share`, which is no number of the table. The claim
+/// `header` is about the spec, all others about what is assumed.
+///
+/// # Errors
+/// As for [`verify`], and where another key differs.
+pub fn verify_assuming(
+    bytes: &[u8],
+    made_for: &Spec,
+    assumed: &Spec,
+    go_on: &dyn Fn(f64) -> bool,
+) -> Result<Verdict, VerifyError> {
+    let mut same = assumed.clone();
+    same.uncertainty.hostile_share = made_for.uncertainty.hostile_share;
+    if same != *made_for {
+        return Err(VerifyError::Unsupported {
+            key: "another key than uncertainty.hostile_share",
+            found: "other values than the table was made for".to_owned(),
+            remedy: "a table for those values is",
+        });
     }
+    let table = TableView::parse(bytes).map_err(VerifyError::Table)?;
+    if table.header().always_on || assumed.preference.always_on {
+        return of_response(&table, made_for, assumed, go_on);
+    }
+    let spec = assumed;
     let header = table.header();
     let model = delayed_loop::closed_loop(&table, spec);
     let regions = Regions::new(header, model.error);
@@ -169,6 +194,7 @@ pub fn verify(
     counts.highest_hz = tally.highest.map(|f| f / 1e6);
     let claims = Findings {
         table: &table,
+        made_for,
         spec,
         model: &model,
         tally: &tally,
@@ -182,7 +208,8 @@ pub fn verify(
         claims,
         reachable_cells,
         counterexample: failures.first().cloned(),
-        spec_hash: hex(&spec.hash()),
+        hostile_share: spec.uncertainty.hostile_share,
+        spec_hash: hex(&made_for.hash()),
         table_spec_hash: hex(&header.spec_hash),
         table_sha256: hex(&Sha256::digest(bytes)),
         table_bytes: bytes.len(),
@@ -206,11 +233,12 @@ pub fn header_claim(bytes: &[u8], spec: &Spec) -> Result<Claim, VerifyError> {
 /// The verdict on a response, or on a table for a spec that asks for one.
 fn of_response(
     table: &TableView<'_>,
+    made_for: &Spec,
     spec: &Spec,
     go_on: &dyn Fn(f64) -> bool,
 ) -> Result<Verdict, VerifyError> {
     let header = table.header();
-    let mut claims = vec![claims::header(table, spec)];
+    let mut claims = vec![claims::header(table, made_for)];
     claims.push(dispatch::claim(spec));
     claims.extend(image::claim(table, spec));
     let proof = response::verify(table, spec, go_on)?;
@@ -222,7 +250,8 @@ fn of_response(
         claims,
         reachable_cells: 0,
         counterexample: None,
-        spec_hash: hex(&spec.hash()),
+        hostile_share: spec.uncertainty.hostile_share,
+        spec_hash: hex(&made_for.hash()),
         table_spec_hash: hex(&header.spec_hash),
         table_sha256: hex(&Sha256::digest(table.bytes())),
         table_bytes: table.bytes().len(),

@@ -171,6 +171,7 @@ fn what_is_proven_is_read_from_the_verdict_on_these_bytes() {
         claims: vec![claim],
         reachable_cells: 0,
         counterexample: None,
+        hostile_share: None,
         spec_hash: String::new(),
         table_spec_hash: String::new(),
         table_sha256: hex(&Sha256::digest(&bytes)),

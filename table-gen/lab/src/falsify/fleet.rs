@@ -13,7 +13,9 @@
 //! | functional | by the sign of a linear functional of the state; the best so far is mutated |
 //!
 //! Every response lies within what the crowd's own chargers can give, and the error of
-//! participation goes the same way. So each trajectory is one of a real fleet.
+//! participation goes the same way. A hostile share of the fleet gives all where the response is
+//! to be the greatest and nothing where it is to be the least; the crowd stands for the others. So
+//! each trajectory is one of a real fleet.
 
 use firmware::table::TableView;
 use model::governor::Governor;
@@ -320,10 +322,12 @@ impl<'a> Fleets<'a> {
                 uncertainty.participation,
                 uncertainty.participation_absolute,
             );
+            let hostile = uncertainty.hostile();
+            let honest = 1.0 - hostile;
             let given = if high {
-                (most * (1.0 + relative) + absolute).min(1.0)
+                (honest * most * (1.0 + relative) + absolute + hostile).min(1.0)
             } else {
-                (least * (1.0 - relative) - absolute).max(0.0)
+                (honest * least * (1.0 - relative) - absolute).max(0.0)
             };
             let loss = match uncertainty.loss_profile {
                 LossProfile::Band if high => loss_low,

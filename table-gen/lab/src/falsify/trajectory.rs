@@ -237,13 +237,16 @@ impl<'a> Trajectories<'a> {
         (acting == Phase::Hold && outside).then_some(ClaimName::Stay)
     }
 
-    /// `P u' - w` \[GW\] at a point of its interval: u' within the participation error and at most
-    /// the whole fleet, w within its band; the ends are -1 and 1.
+    /// `P u' - w` \[GW\] at a point of its interval: u' within the participation error and what the
+    /// hostile share gives or refuses, at most the whole fleet, w within its band; the ends are -1
+    /// and 1.
     fn net_power(&self, command: Command, share: f64) -> f64 {
         let uncertainty = &self.spec.uncertainty;
         let error = uncertainty.participation;
-        let least = (command.participation * (1.0 - error)).max(0.0);
-        let most = (command.participation * (1.0 + error)).min(1.0);
+        let hostile = uncertainty.hostile();
+        let honest = command.participation * (1.0 - hostile);
+        let least = (honest * (1.0 - error)).max(0.0);
+        let most = (honest * (1.0 + error) + hostile).min(1.0);
         let [loss_least, loss_most] = uncertainty.loss_gw;
         let low = self.plant.fleet * least - loss_most;
         let high = self.plant.fleet * most - loss_least;

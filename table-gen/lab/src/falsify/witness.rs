@@ -49,6 +49,7 @@ fn is_exact(spec: &Spec) -> bool {
     let [low, high] = uncertainty.loss_gw;
     low == high
         && uncertainty.participation == 0.0
+        && uncertainty.hostile() == 0.0
         && uncertainty.measurement == [0.0; STATES]
         && uncertainty.initial.lower == uncertainty.initial.upper
 }

@@ -59,6 +59,12 @@ impl<'t> Chargers<'t> {
         self.slots.iter().map(Vec::len).sum()
     }
 
+    /// Of them, those that do not do what they are told.
+    pub(super) fn hostile(&self) -> usize {
+        let all = self.slots.iter().flatten();
+        all.filter(|one| !one.is_honest()).count()
+    }
+
     /// The next part, at a true deviation \[µHz\]: the response of the fleet as a share of it, and
     /// what the chargers that ticked did.
     pub(super) fn part(&mut self, f_uhz: i32) -> (f64, Tally) {

@@ -26,7 +26,8 @@
 //! So what acts at time t was decided in \[t - d₂ - T, t - d₁\], and each charger's response lies
 //! between the least V⁻ - c and the greatest V⁺ + c of that time. So does the mean over any number
 //! of chargers, which is the convex hull. Of a participation u the grid gets anything from
-//! u (1 - ρ) - α to u (1 + ρ) + α, at most everything.
+//! u (1 - ρ) - α to u (1 + ρ) + α, at most everything. A share σ of the chargers that is hostile
+//! gives anything: then the rest of the fleet counts (1 - σ) times, and σ is added above.
 //!
 //! ## Time
 //! Time goes in parts of a tick, as the fleet's does: decisions are made and powers change where a
@@ -58,6 +59,8 @@ pub struct HullConfig {
     pub participation: f64,
     /// α: absolute error of the participation, as a share of the fleet.
     pub participation_absolute: f64,
+    /// σ: share of the chargers that does as it likes.
+    pub hostile_share: f64,
 }
 
 /// Least and greatest of one quantity.
@@ -174,9 +177,11 @@ impl ProvenHull {
             self.config.participation,
             self.config.participation_absolute,
         );
+        let hostile = self.config.hostile_share;
+        let honest = |ppm: u32| (1.0 - hostile) * share(ppm);
         (
-            (share(low) * (1.0 - relative) - absolute).max(0.0),
-            (share(high) * (1.0 + relative) + absolute).min(1.0),
+            (honest(low) * (1.0 - relative) - absolute).max(0.0),
+            (honest(high) * (1.0 + relative) + absolute + hostile).min(1.0),
         )
     }
 }
@@ -254,6 +259,7 @@ mod tests {
         delay_s: [0.1, 0.5],
         participation: 0.0,
         participation_absolute: 0.0,
+        hostile_share: 0.0,
     };
     /// The same in parts of 10 ms.
     const LAG: [usize; 2] = [5, 7];

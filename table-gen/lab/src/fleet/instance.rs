@@ -9,7 +9,7 @@ use firmware::table::TableView;
 use rand::SeedableRng;
 use rand_pcg::Pcg32;
 
-use super::config::{FleetConfig, PARTS};
+use super::config::{FleetConfig, Hostility, PARTS};
 use super::hardware::{Dispatcher, Meter, NoWatchdog, Operations};
 use crate::car::{Car, CarConfig, THREE_PHASE_V};
 use crate::simulation::chance::{symmetric, unit};
@@ -71,6 +71,9 @@ pub(super) struct Instance<'t> {
     /// The command when a change of 5 % was counted last \[ppm\].
     counted_ppm: i64,
     operations: Operations,
+    hostility: Option<Hostility>,
+    /// Whether the event has been: before it all are honest, for the grid was at rest with them.
+    attacks: bool,
     /// What happened since the event.
     pub(super) counts: Counts,
 }
@@ -156,6 +159,8 @@ impl<'t> Instance<'t> {
             ticks: 0,
             counted_ppm: 0,
             operations,
+            hostility: Hostility::of(serial as usize, config.hostile_share),
+            attacks: false,
             counts: Counts::default(),
         }
     }
@@ -181,7 +186,13 @@ impl<'t> Instance<'t> {
             self.counted_ppm = command;
             self.counts.changes += 1;
         }
-        let given = self.car.tick(self.told_ppm(report.set_point), now_ms);
+        let told = self.told_ppm(report.set_point);
+        let told = match self.hostility.filter(|_| self.attacks) {
+            None => told,
+            Some(Hostility::Opposite) => PPM - told,
+            Some(Hostility::Nothing) => 0,
+        };
+        let given = self.car.tick(told, now_ms);
         let change = given - self.given_ppm;
         self.given_ppm = given;
         Tally {
@@ -202,11 +213,17 @@ impl<'t> Instance<'t> {
         }
     }
 
-    /// Forgets what was counted before the event.
+    /// The event: what was counted before is forgotten, and a hostile charger is one from now on.
     pub(super) fn event(&mut self) {
+        self.attacks = true;
         self.counts = Counts::default();
         self.operations.forget();
         self.charger.source_mut().missed_ticks = 0;
+    }
+
+    /// Whether it does what it is told.
+    pub(super) const fn is_honest(&self) -> bool {
+        self.hostility.is_none()
     }
 
     /// What was counted since the event.

@@ -17,6 +17,8 @@ const SETTLED_S: f64 = 60.0;
 pub struct FleetMeasures {
     /// Chargers that never respond.
     pub failed: usize,
+    /// Chargers that do the opposite of what they are told, or nothing, from the event on.
+    pub hostile: usize,
     /// Largest rise of the response within a second \[GW\].
     pub rise_gw_per_s: f64,
     /// Largest fall of the response within a second \[GW\]: load that comes back at once.
@@ -69,6 +71,8 @@ pub(super) struct Meters {
 pub(super) struct Finish<'r> {
     /// Chargers that never respond.
     pub(super) failed: usize,
+    /// Chargers that do not do what they are told.
+    pub(super) hostile: usize,
     /// Of each working charger.
     pub(super) counts: &'r [Counts],
     /// Ticks without a reading, of all of them together.
@@ -131,6 +135,7 @@ impl Meters {
         let (operations, operations_max) = of(|counts| counts.operations);
         FleetMeasures {
             failed: finish.failed,
+            hostile: finish.hostile,
             rise_gw_per_s: self.rise * self.fleet_gw,
             fall_gw_per_s: self.fall * self.fleet_gw,
             changed_at_once: f64::from(self.changed) / self.instances,

@@ -161,6 +161,7 @@ pub fn run(
         summary: monitor.summary(),
         measures: meters.finish(&Finish {
             failed: config.instances - working,
+            hostile: chargers.hostile(),
             counts: &counts,
             missed,
             outside: outside.map(|outside| (outside.seconds(), outside.farthest)),
@@ -181,5 +182,39 @@ fn hull_config(spec: &Spec, table: &TableView<'_>) -> Option<HullConfig> {
         delay_s: spec.command_delay_s(),
         participation: uncertainty.participation,
         participation_absolute: uncertainty.participation_absolute,
+        hostile_share: uncertainty.hostile(),
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use synth::pipeline;
+
+    /// From the event on a tenth of 40 chargers gives the opposite or nothing: within what the
+    /// proof assumes where the spec says so, and outside of it where it does not.
+    #[test]
+    fn hostile_chargers_stay_within_the_share_that_is_assumed() {
+        let outside_s = |set: &[String]| {
+            let spec = Spec::load("gb-bi", set).unwrap();
+            let bytes = pipeline::response(&spec).unwrap();
+            let table = TableView::parse(&bytes).unwrap();
+            let config = FleetConfig {
+                hostile_share: 0.1,
+                ..FleetConfig::sound(&spec, 40)
+            };
+            let scenario = Scenario {
+                loss_gw: 0.2,
+                duration_s: 20.0,
+                ..Scenario::of(&spec)
+            };
+            let run = run(&spec, &table, &config, &scenario, &|| true).unwrap();
+            assert_eq!(run.measures.hostile, 4);
+            run.measures.outside_proven_hull_s.unwrap()
+        };
+        let assumed = ["uncertainty.hostile_share=0.1".to_owned()];
+        assert_eq!(outside_s(&assumed), 0.0);
+        // A loss of 0.2 GW asks for little; 5 % of the fleet give all, for most of the run.
+        assert!(outside_s(&[]) > 10.0);
+    }
 }

@@ -200,6 +200,7 @@ mod tests {
                 ],
                 real,
             }),
+            hostile_share: None,
             spec_hash: String::new(),
             table_spec_hash: String::new(),
             table_sha256: String::new(),

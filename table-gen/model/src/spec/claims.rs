@@ -54,6 +54,19 @@ pub struct UncertaintySpec {
     ///
     /// Unit: 1. Allowed: a number from 0 to below 1. Default: 0.
     pub participation_absolute: f64,
+    /// Probability with which [`Self::participation`] and [`Self::participation_absolute`] must
+    /// cover the mean of chargers that err independently, over `requirements.horizon_s`
+    /// ([`crate::independence`]). Absent: nothing is asked, the errors are a hypothesis.
+    ///
+    /// Unit: 1. Allowed: a number from 0.5 to 0.999999999999, or none. Default: none.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub participation_confidence: Option<f64>,
+    /// Share of the chargers that does as it likes at all times: the opposite, nothing, or
+    /// whatever harms most. Absent: none.
+    ///
+    /// Unit: 1. Allowed: a number from 0 to 1, or none. Default: none.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub hostile_share: Option<f64>,
     /// Bound on the error of the state estimate, per state (f, g, l, p).
     ///
     /// Unit: Hz, GW, GW, GW. Allowed: 4 numbers, each from 0 to 10. Default: [0, 0, 0, 0].
@@ -86,6 +99,14 @@ pub struct UncertaintySpec {
     pub initial: InitialBox,
 }
 
+impl UncertaintySpec {
+    /// Share of the chargers that does as it likes; 0 where the key is absent.
+    #[must_use]
+    pub fn hostile(&self) -> f64 {
+        self.hostile_share.unwrap_or(0.0)
+    }
+}
+
 impl Default for UncertaintySpec {
     fn default() -> Self {
         Self {
@@ -93,6 +114,8 @@ impl Default for UncertaintySpec {
             loss_profile: LossProfile::Band,
             participation: 0.0,
             participation_absolute: 0.0,
+            participation_confidence: None,
+            hostile_share: None,
             measurement: [0.0; 4],
             actuation_delay_s: DelayRange::exactly(0.0),
             inertia_gw_s_per_hz: None,

@@ -32,7 +32,13 @@ const NOT_OF_THE_TABLE: [&str; 2] = ["charger", "chance"];
 /// Section of which a key that is absent gives no line: it came after the first tables.
 const GOVERNOR: &str = "plant.governor";
 /// Other keys that give no line where they are absent.
-const LATER: [&str; 3] = [FORMULA, RECOVERY, CHANGES];
+const LATER: [&str; 5] = [
+    FORMULA,
+    RECOVERY,
+    CHANGES,
+    "uncertainty.participation_confidence",
+    "uncertainty.hostile_share",
+];
 const HEADING: &str = "holdfast-spec-1\n";
 
 impl Spec {
@@ -135,6 +141,18 @@ mod tests {
         assert!(LATER.iter().all(|key| !text(&[]).contains(key)));
         let stated = text(&[format!("{CHANGES}=30")]);
         assert!(stated.contains("\nrequirements.changes_per_300_s=403e000000000000\n"));
+    }
+
+    #[test]
+    fn a_key_that_came_later_counts_where_it_is_there() {
+        let hash = |set: &[&str]| {
+            let set: Vec<String> = set.iter().map(|s| (*s).to_owned()).collect();
+            Spec::load("gb-bi", &set).unwrap().hash()
+        };
+        let some = hash(&["uncertainty.hostile_share=0.02"]);
+        assert_ne!(some, hash(&[]));
+        assert_ne!(some, hash(&["uncertainty.hostile_share=0"]));
+        assert_eq!(hash(&["uncertainty.hostile_share=none"]), hash(&[]));
     }
 
     #[test]

@@ -195,6 +195,8 @@ const INTERVAL: Allowed = Allowed::Numbers {
     len: 2,
     each: Range::closed(-10.0, 10.0),
 };
+/// Past this a double has few digits left for what lies between a probability and 1.
+const CONFIDENCE: Range = Range::closed(0.5, 1.0 - 1e-12);
 const STATE_UNIT: &str = "Hz, GW, GW, GW";
 
 /// Longest tick \[s\], as the device's reader has it.
@@ -339,6 +341,10 @@ pub(super) const KEYS: &[Key] = &[
         "relative error of participation", |s| KeyValue::Number(s.uncertainty.participation)),
     row("uncertainty.participation_absolute", "1", Allowed::Number(Range::below(0.0, 1.0)),
         "error of participation beside the relative one", |s| KeyValue::Number(s.uncertainty.participation_absolute)),
+    row("uncertainty.participation_confidence", "1", Allowed::OptionalNumber(CONFIDENCE),
+        "probability with which participation and participation_absolute must cover chargers that err independently; absent: not asked", |s| optional(s.uncertainty.participation_confidence)),
+    row("uncertainty.hostile_share", "1", Allowed::OptionalNumber(Range::closed(0.0, 1.0)),
+        "share of the chargers that does as it likes, the opposite or nothing; absent: none", |s| optional(s.uncertainty.hostile_share)),
     row("uncertainty.measurement", STATE_UNIT, Allowed::Numbers { len: 4, each: Range::closed(0.0, 10.0) },
         "bound on the state estimate's error (f, g, l, p)", |s| KeyValue::Numbers(&s.uncertainty.measurement)),
     row("uncertainty.actuation_delay_s", "s", Allowed::NumberOrInterval(Range::closed(0.0, 60.0)),

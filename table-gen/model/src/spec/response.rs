@@ -7,6 +7,7 @@ use super::meter::MeterKind;
 use super::origin::{Origin, inconsistent};
 use super::sampling::to_whole_ms;
 use super::{Domain, Spec, SpecError};
+use crate::independence::Crowd;
 use crate::table_fields;
 
 /// Checks the preferred law, and that the spec's method covers what is uncertain.
@@ -53,12 +54,46 @@ fn check_law(spec: &Spec, origin: &Origin) -> Result<(), SpecError> {
         return Err(inconsistent(origin, key, found, allowed));
     }
     match table_fields::response(spec) {
-        Ok(_) => Ok(()),
+        Ok(_) => check_confidence(spec, origin),
         Err(error) => {
             let found = error.value.to_string();
             Err(inconsistent(origin, error.key, found, error.allowed))
         }
     }
+}
+
+/// Errors of the participation that cover as many independent chargers with the probability that is
+/// asked for.
+fn check_confidence(spec: &Spec, origin: &Origin) -> Result<(), SpecError> {
+    let uncertainty = &spec.uncertainty;
+    let Some(confidence) = uncertainty.participation_confidence else {
+        return Ok(());
+    };
+    let Some(time_s) = spec.requirements.horizon_s else {
+        let key = "requirements.horizon_s";
+        let allowed = "a time, over which uncertainty.participation_confidence is meant";
+        return Err(inconsistent(origin, key, "none", allowed));
+    };
+    let (relative, absolute) = (
+        uncertainty.participation,
+        uncertainty.participation_absolute,
+    );
+    let crowd = Crowd::of(spec, time_s);
+    if crowd.outside(relative, absolute) <= 1.0 - confidence {
+        return Ok(());
+    }
+    let least = crowd.absolute_error(relative, confidence);
+    let found = format!("{absolute}, beside uncertainty.participation = {relative}");
+    let allowed = format!(
+        "at least {} for {} independent chargers that together decide {} times in {time_s} s, with \
+         a probability of {confidence}",
+        // As few digits as are read, rounded up.
+        (least * 1e5).ceil() / 1e5,
+        crowd.chargers,
+        crowd.moments
+    );
+    let key = "uncertainty.participation_absolute";
+    Err(inconsistent(origin, key, found, allowed))
 }
 
 /// What games do not cover must not be there.
@@ -106,6 +141,10 @@ fn check_games(spec: &Spec, origin: &Origin) -> Result<(), SpecError> {
     if uncertainty.participation_absolute > 0.0 {
         let found = uncertainty.participation_absolute.to_string();
         return refuse("uncertainty.participation_absolute", found, "0");
+    }
+    if let Some(confidence) = uncertainty.participation_confidence {
+        let key = "uncertainty.participation_confidence";
+        return refuse(key, confidence.to_string(), "none");
     }
     if spec.meter.kind != MeterKind::Ideal {
         let found = format!("{:?}", spec.meter.kind.name());

@@ -6,6 +6,7 @@ pub(super) const SHIPPED: &[(&str, &str)] = &[
     ("paper-uni", include_str!("../../../specs/paper-uni.toml")),
     ("gb-bi", include_str!("../../../specs/gb-bi.toml")),
     ("gb-uni", include_str!("../../../specs/gb-uni.toml")),
+    ("gb-bi-slow", include_str!("../../../specs/gb-bi-slow.toml")),
     (
         "gb-bi-ade7953",
         include_str!("../../../specs/gb-bi-ade7953.toml"),

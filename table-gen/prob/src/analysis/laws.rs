@@ -14,7 +14,6 @@ use crate::bands::BandProof;
 use crate::closed_loop::{self, ClosedLoop, ClosedLoopError};
 use crate::loss::{LossBand, Losses};
 use crate::participation::{Drawn, Participation};
-use crate::union::all_within;
 use crate::value;
 
 /// What is asked, of which table.
@@ -130,18 +129,11 @@ impl Laws<'_> {
         proof: &BandProof,
         go_on: &dyn Fn() -> bool,
     ) -> Result<OfDraws, AnalysisError> {
-        let within = proof
+        let absolute = self.spec.uncertainty.participation_absolute;
+        let union = proof
             .participation
             .filter(|_| proof.holds)
-            .and_then(|error| kind.within(error));
-        let union = within.map(|within| {
-            let outside = if within < 1.0 {
-                (1.0 - within).next_up()
-            } else {
-                0.0
-            };
-            all_within(u64::from(self.steps()), outside)
-        });
+            .map(|error| kind.all_within(u64::from(self.steps()), error, absolute));
         let mut spec = self.spec.clone();
         spec.uncertainty.loss_gw = [proof.band.low_gw, proof.band.high_gw];
         let settings = &self.question.settings;

@@ -58,9 +58,6 @@ pub enum AnalysisError {
         /// What the spec leaves for it.
         room_hz: f64,
     },
-    /// A distribution for which a response has no bound.
-    #[error("a response has no bound for a fleet of coins: take uniform, gaussian or truncated")]
-    Coins,
 }
 
 /// A layer: its bound, and how it was found.

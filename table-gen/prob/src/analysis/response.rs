@@ -7,8 +7,8 @@ use model::spec::Spec;
 use super::{AnalysisError, Answer, Layer, Layers, Question};
 use crate::bands::{self, Alone};
 use crate::loss::Losses;
-use crate::participation::Drawn;
-use crate::union::{all_within, draws_in};
+use crate::participation::Drawn as _;
+use crate::union::draws_in;
 
 /// Limits whose yearly rates are shown \[Hz\]: 49.5 and 49.2 Hz.
 const LIMITS_HZ: [f64; 2] = [-0.5, -0.8];
@@ -32,19 +32,10 @@ pub(super) fn of_response(
     errors.push(known);
     errors.sort_by(|a, b| b.total_cmp(a));
     errors.dedup();
-    let of_draws = |error: f64| -> Result<f64, AnalysisError> {
-        match &question.participation {
-            None => Ok(1.0),
-            Some(drawn) => {
-                let within = drawn.within(error).ok_or(AnalysisError::Coins)?;
-                let outside = if within < 1.0 {
-                    (1.0 - within).next_up()
-                } else {
-                    0.0
-                };
-                Ok(all_within(draws, outside))
-            }
-        }
+    let absolute = spec.uncertainty.participation_absolute;
+    let of_draws = |error: f64| match &question.participation {
+        None => 1.0,
+        Some(drawn) => drawn.all_within(draws, error, absolute),
     };
     let (mut proofs, mut proven, mut drawn) = (Vec::new(), Vec::new(), Vec::new());
     for (index, band) in losses.bands.iter().enumerate() {
@@ -53,7 +44,7 @@ pub(super) fn of_response(
         let certain = f64::from(u8::from(proof.holds));
         proven.push(certain);
         drawn.push(match proof.participation {
-            Some(error) if proof.holds => of_draws(error)?,
+            Some(error) if proof.holds => of_draws(error),
             _ => 0.0,
         });
         proofs.push(proof);

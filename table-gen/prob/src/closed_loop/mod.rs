@@ -314,6 +314,12 @@ fn covered(table: &TableView<'_>, spec: &Spec) -> Result<(), ClosedLoopError> {
             "uncertainty.participation = 0 is",
         );
     }
+    if spec.uncertainty.hostile() > 0.0 {
+        return unsupported(
+            "a hostile share (uncertainty.hostile_share)",
+            "a fleet without one is",
+        );
+    }
     Ok(())
 }
 

@@ -5,10 +5,11 @@
 
 mod cut;
 
+use model::independence::Crowd;
 use model::interval::Interval;
 pub use model::participation::{Participation, ParticipationError, TAIL};
 
-use crate::normal;
+use crate::{normal, union};
 use cut::{coins, relative};
 
 /// A piece of the distribution.
@@ -22,28 +23,41 @@ pub struct Bin {
 
 /// What a bound asks of a distribution.
 pub trait Drawn {
-    /// Lower bound of the probability of a relative error within ± r of a command of 1 or less: for
-    /// proofs that hold for any error within r. Nothing for a fleet of coins, whose relative error
-    /// depends on the command.
-    fn within(&self, r: f64) -> Option<f64>;
+    /// Lower bound of the probability that all of so many draws are within `u (1 ± r) ± a` of what
+    /// was commanded: for proofs that hold for any such error. Draws may depend on each other; the
+    /// coins of a fleet are independent, and each charger draws at a moment of its own.
+    fn all_within(&self, draws: u64, r: f64, a: f64) -> f64;
 
     /// The bins under a command, each at most `width` of participation wide.
     fn bins(&self, command: f64, width: f64) -> Vec<Bin>;
 }
 
 impl Drawn for Participation {
-    fn within(&self, r: f64) -> Option<f64> {
+    fn all_within(&self, draws: u64, r: f64, a: f64) -> f64 {
+        let by_draws = |within: f64| {
+            let outside = if within < 1.0 {
+                (1.0 - within).next_up()
+            } else {
+                0.0
+            };
+            union::all_within(draws, outside)
+        };
         let inside = |z: f64| (1.0 - normal::outside(z)).next_down().max(0.0);
         match *self {
-            Self::Exact => Some(1.0),
-            Self::Uniform { bound } if r >= bound => Some(1.0),
-            Self::Uniform { bound } => Some((r / bound).next_down().max(0.0)),
-            Self::Truncated { bound, .. } if r >= bound => Some(1.0),
+            Self::Exact => 1.0,
+            Self::Uniform { bound } | Self::Truncated { bound, .. } if r >= bound => 1.0,
+            Self::Uniform { bound } => by_draws((r / bound).next_down().max(0.0)),
             // Given |e| <= bound, an error within r is likelier still.
             Self::Truncated { sigma, .. } | Self::Gaussian { sigma, .. } => {
-                Some(inside(down(r / sigma)))
+                by_draws(inside(down(r / sigma)))
             }
-            Self::Bernoulli { .. } => None,
+            Self::Bernoulli { chargers } => {
+                let crowd = Crowd {
+                    chargers,
+                    moments: draws.saturating_mul(chargers.into()),
+                };
+                (1.0 - crowd.outside(r, a)).next_down().max(0.0)
+            }
         }
     }
 
@@ -163,5 +177,22 @@ mod tests {
         let off = |bin: &&Bin| (bin.delivered.mid() / 0.3 - 1.0).abs() < 0.05;
         let inside: f64 = bins.iter().filter(off).map(|bin| bin.probability).sum();
         assert!((1.0 - inside) * 120.0 < 3.7e-4);
+    }
+
+    #[test]
+    fn all_coins_are_within_an_absolute_error_beside_the_relative_one() {
+        let coins = Participation::Bernoulli { chargers: 25_000 };
+        // A small command is missed by 10 % of itself: nothing is covered.
+        assert_eq!(coins.all_within(1200, 0.1, 0.0), 0.0);
+        // Three times the standard deviation at u = 1/2 is 0.0095; ten times is past all doubt.
+        let bound = coins.all_within(1200, 0.1, 0.01);
+        assert!(bound > 1.0 - 1e-6 && bound < 1.0, "{bound}");
+        // No bound is above what the exact distribution leaves, for one draw and one command.
+        let exact: f64 = super::cut::coins(25_000, 0.02, 1.0 / 25_000.0)
+            .iter()
+            .filter(|bin| (bin.delivered.mid() - 0.02).abs() <= 0.003)
+            .map(|bin| bin.probability)
+            .sum();
+        assert!(coins.all_within(1, 0.1, 0.001) <= exact);
     }
 }

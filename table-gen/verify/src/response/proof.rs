@@ -7,6 +7,7 @@ use firmware::response::ResponseLaw;
 use firmware::table::{Hypotheses, LossProfile as Profile, TableView};
 use firmware::units::MICRO;
 use model::governor::Governor;
+use model::independence::Crowd;
 use model::interval::Interval;
 use model::plant::Plant;
 use model::spec::Spec;
@@ -175,7 +176,7 @@ fn case(law: &ResponseLaw, table: &TableView<'_>, spec: &Spec) -> Case {
             slope_jitter_s: lag_most - lag_least + longer,
             participation: share(assumed.participation_relative_ppm),
             participation_absolute: share(assumed.participation_absolute_ppm),
-            hostile_share: 0.0,
+            hostile_share: spec.uncertainty.hostile(),
             loss,
             profile: match assumed.loss_profile {
                 Profile::Constant => LossProfile::Constant,
@@ -205,9 +206,24 @@ fn not_examined(spec: &Spec, reason: &str) -> Vec<Claim> {
         .collect()
 }
 
+/// How certain the claims are: they hold always, or for as long as the mean of chargers that err
+/// independently is within what is assumed.
+fn certainty(spec: &Spec) -> String {
+    let confidence = spec.uncertainty.participation_confidence;
+    match (confidence, spec.requirements.horizon_s) {
+        (Some(confidence), Some(time_s)) => format!(
+            ", with a probability of {confidence} over {time_s} s for {} chargers that err \
+             independently",
+            Crowd::of(spec, time_s).chargers
+        ),
+        _ => String::new(),
+    }
+}
+
 /// The claims, without an answer.
 fn statements(spec: &Spec) -> Vec<Claim> {
     let requirements = &spec.requirements;
+    let certainty = certainty(spec);
     let [low, high] = requirements.inner_hz;
     let within_s = requirements.settle_within_s;
     let claim = |name, limit, unit: &'static str, statement| Claim {
@@ -216,7 +232,7 @@ fn statements(spec: &Spec) -> Vec<Claim> {
         bound: None,
         limit,
         unit: unit.into(),
-        statement,
+        statement: format!("{statement}{certainty}"),
         reason: None,
     };
     let mut claims = vec![

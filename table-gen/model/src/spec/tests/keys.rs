@@ -82,6 +82,9 @@ fn the_key_table_and_the_structs_have_the_same_keys() {
         "chance.participation=exact",
         "chance.draw_interval_s=1.5",
         "chance.noise_hz=0.001",
+        "uncertainty.hostile_share=0.01",
+        "uncertainty.participation_absolute=0.99",
+        "uncertainty.participation_confidence=0.5",
     ];
     let spec = super::with(&bands).unwrap();
     let text = toml::to_string(&spec).unwrap();

@@ -67,6 +67,7 @@ fn exactly_known(spec: &Spec) -> bool {
     let uncertainty = &spec.uncertainty;
     uncertainty.loss_gw[0] == uncertainty.loss_gw[1]
         && uncertainty.participation == 0.0
+        && uncertainty.hostile() == 0.0
         && uncertainty.measurement == [0.0; STATES]
         && uncertainty.actuation_delay_s.most_s() == 0.0
         && uncertainty.initial.lower == uncertainty.initial.upper

@@ -1,10 +1,4 @@
-//! The bounds of a fleet under a response, attacked: fleets of single chargers with the firmware's
-//! own law, drawn at random and chosen with malice, never leave them.
-//!
-//! The plant is integrated here by itself (classic Runge-Kutta, 5 ms), the chargers run
-//! `firmware::response`; nothing of the verifier is used but the bounds that it gives. Within the
-//! hypotheses everything is drawn anew: clocks, delays that change at every tick, ages and errors
-//! of readings, delivery, the loss, and the state that the event finds.
+//! Fleets of single chargers on the plant, each against the bounds that were found for it.
 
 use firmware::response::{LevelOffset, Response, ResponseLaw};
 use model::governor::Governor;
@@ -13,9 +7,7 @@ use model::plant::Plant;
 use rand::RngExt;
 use rand_pcg::Pcg64;
 use rand_pcg::rand_core::SeedableRng;
-use verify::response::{
-    Assumed, Case, Found, LossProfile, PlantBand, RealLaw, Resolution, examine,
-};
+use verify::response::{Assumed, Case, Found, LossProfile, PlantBand, RealLaw};
 
 const FLEET_GW: f64 = 1.4;
 const TICK_S: f64 = 0.1;
@@ -54,7 +46,27 @@ fn plant() -> Plant {
     }
 }
 
-fn case(loss: Interval, governor: Governor) -> Case {
+/// What fleets are drawn for.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Setting {
+    pub(crate) loss: Interval,
+    pub(crate) governor: Governor,
+    /// Share of the chargers that gives all or nothing, as it suits the adversary.
+    pub(crate) hostile_share: f64,
+}
+
+impl Setting {
+    pub(crate) fn honest(loss: Interval, governor: Governor) -> Self {
+        Self {
+            loss,
+            governor,
+            hostile_share: 0.0,
+        }
+    }
+}
+
+pub(crate) fn case(setting: Setting) -> Case {
+    let Setting { loss, governor, .. } = setting;
     let known = plant();
     let share = |ppm: u32| f64::from(ppm) / 1e6;
     Case {
@@ -86,7 +98,7 @@ fn case(loss: Interval, governor: Governor) -> Case {
             slope_jitter_s: AGE_S,
             participation: DELIVERY,
             participation_absolute: 0.0,
-            hostile_share: 0.0,
+            hostile_share: setting.hostile_share,
             loss,
             profile: LossProfile::Constant,
             initial: [0.02, 0.1, 0.06, 0.06],
@@ -97,7 +109,7 @@ fn case(loss: Interval, governor: Governor) -> Case {
 
 /// Who chooses what the hypotheses leave open.
 #[derive(Debug, Clone, Copy)]
-enum Malice {
+pub(crate) enum Malice {
     /// Everything at random, anew each time.
     Random,
     /// As little power as possible, as late as possible.
@@ -123,13 +135,16 @@ struct Charger {
 
 /// Runs one fleet; the largest share of the way from the middle of the bounds to their edge that f
 /// took.
-fn run(
+pub(crate) fn run(
     seed: u64,
     malice: Malice,
     chargers: usize,
-    (loss, governor): (Interval, Governor),
+    setting: Setting,
     found: &Found,
 ) -> f64 {
+    let Setting { loss, governor, .. } = setting;
+    // The first ones, rounded down: no more than the share.
+    let hostile = (setting.hostile_share * chargers as f64 + 1e-9).floor() as usize;
     let mut rng = Pcg64::seed_from_u64(seed);
     let plant = plant();
     let steps_per_tick = (TICK_S / H).round() as usize;
@@ -235,7 +250,11 @@ fn run(
                 _ if up => 1.0 + DELIVERY,
                 _ => 1.0 - DELIVERY,
             };
-            sum += (command * delivery).min(1.0);
+            // The grid was at rest with what hostile chargers gave before the event: nothing.
+            sum += match index < hostile {
+                true => f64::from(u8::from(up && t >= 0.0)),
+                false => (command * delivery).min(1.0),
+            };
         }
         if t < 0.0 {
             // The rest before the event.
@@ -265,101 +284,4 @@ fn run(
         worst = worst.max((x[0] - middle).abs() / (tube.high - middle));
     }
     worst
-}
-
-const RESOLUTION: Resolution = Resolution {
-    step_s: 0.05,
-    follow_s: 30.0,
-    memory_s: 25.0,
-};
-
-#[test]
-fn no_fleet_leaves_its_bounds() {
-    let mut closest = 0.0f64;
-    for (number, low) in [0.0, 0.3, 0.8, 1.3, 1.8, 2.16].into_iter().enumerate() {
-        let loss = Interval::hull(low, low + 0.04);
-        let grid = (loss, Governor::LINEAR);
-        let found = examine(&case(loss, Governor::LINEAR), RESOLUTION).expect("bounds");
-        for draw in 0..6 {
-            let seed = (number * 100 + draw) as u64;
-            for malice in [
-                Malice::Random,
-                Malice::LowAndLate,
-                Malice::HighAndEarly,
-                Malice::Pump,
-                Malice::Swing(1.0),
-                Malice::Swing(3.0 + draw as f64),
-                Malice::TwoGroups,
-            ] {
-                let chargers = [1, 2, 12][draw % 3];
-                closest = closest.max(run(seed, malice, chargers, grid, &found));
-            }
-        }
-        closest = closest.max(run(9, Malice::Random, 300, grid, &found));
-    }
-    // Bounds that nobody comes near would prove little: someone gets at least half way to the edge.
-    assert!(closest > 0.5, "{closest}");
-    println!("closest: {closest:.3} of the way to the edge of the bounds");
-}
-
-/// Bounds for a person.
-fn shown(found: &Found) -> String {
-    let end = found.for_ever.map_or("nothing for ever".to_owned(), |f| {
-        format!("in the end {:.4} to {:.4}", f.low, f.high)
-    });
-    format!("f in {:.4} to {:.4} Hz, {end}", found.f.low, found.f.high)
-}
-
-/// The same with governors that have a dead band, a limited rate and a limited output, each alone
-/// and all together.
-#[test]
-fn no_fleet_leaves_its_bounds_on_limited_governors() {
-    let dead = Governor {
-        deadband_hz: 0.015,
-        ..Governor::LINEAR
-    };
-    let slow = Governor {
-        rate_gw_per_s: 0.3,
-        ..Governor::LINEAR
-    };
-    let full = Governor {
-        output_gw: [-0.3, 1.2],
-        ..Governor::LINEAR
-    };
-    let all = Governor {
-        deadband_hz: 0.015,
-        rate_gw_per_s: 0.4,
-        output_gw: [-0.4, 1.4],
-    };
-    let losses: [(Governor, &[f64]); 4] = [
-        (dead, &[0.0, 0.8, 1.6, 2.16]),
-        (slow, &[0.0, 0.8, 1.2, 1.6]),
-        (full, &[0.0, 0.8, 1.2, 1.6, 2.0]),
-        (all, &[0.0, 0.8, 1.2]),
-    ];
-    for (number, (governor, losses)) in losses.into_iter().enumerate() {
-        let mut closest = 0.0f64;
-        for (loss_number, low) in losses.iter().enumerate() {
-            let loss = Interval::hull(*low, low + 0.04);
-            let found = examine(&case(loss, governor), RESOLUTION).expect("bounds");
-            println!("{governor:?}, {low} GW: {found}", found = shown(&found));
-            for draw in 0..4 {
-                let seed = (number * 1000 + loss_number * 100 + draw) as u64;
-                for malice in [
-                    Malice::Random,
-                    Malice::LowAndLate,
-                    Malice::HighAndEarly,
-                    Malice::Pump,
-                    Malice::Swing(3.0 + draw as f64),
-                    Malice::TwoGroups,
-                ] {
-                    let chargers = [1, 2, 12][draw % 3];
-                    let went = run(seed, malice, chargers, (loss, governor), &found);
-                    closest = closest.max(went);
-                }
-            }
-        }
-        assert!(closest > 0.5, "{governor:?}: {closest}");
-        println!("{governor:?}: closest {closest:.3}");
-    }
 }

@@ -1,0 +1,151 @@
+//! The bounds of a fleet under a response, attacked: fleets of single chargers with the firmware's
+//! own law, drawn at random and chosen with malice, never leave them.
+//!
+//! The plant is integrated here by itself (classic Runge-Kutta, 5 ms), the chargers run
+//! `firmware::response`; nothing of the verifier is used but the bounds that it gives. Within the
+//! hypotheses everything is drawn anew: clocks, delays that change at every tick, ages and errors
+//! of readings, delivery, the loss, and the state that the event finds.
+
+mod attack;
+
+use attack::{Malice, Setting, case, run};
+use model::governor::Governor;
+use model::interval::Interval;
+use verify::response::{Found, Resolution, examine};
+
+const RESOLUTION: Resolution = Resolution {
+    step_s: 0.05,
+    follow_s: 30.0,
+    memory_s: 25.0,
+};
+
+#[test]
+fn no_fleet_leaves_its_bounds() {
+    let mut closest = 0.0f64;
+    for (number, low) in [0.0, 0.3, 0.8, 1.3, 1.8, 2.16].into_iter().enumerate() {
+        let loss = Interval::hull(low, low + 0.04);
+        let grid = Setting::honest(loss, Governor::LINEAR);
+        let found = examine(&case(grid), RESOLUTION).expect("bounds");
+        for draw in 0..6 {
+            let seed = (number * 100 + draw) as u64;
+            for malice in [
+                Malice::Random,
+                Malice::LowAndLate,
+                Malice::HighAndEarly,
+                Malice::Pump,
+                Malice::Swing(1.0),
+                Malice::Swing(3.0 + draw as f64),
+                Malice::TwoGroups,
+            ] {
+                let chargers = [1, 2, 12][draw % 3];
+                closest = closest.max(run(seed, malice, chargers, grid, &found));
+            }
+        }
+        closest = closest.max(run(9, Malice::Random, 300, grid, &found));
+    }
+    // Bounds that nobody comes near would prove little: someone gets at least half way to the edge.
+    assert!(closest > 0.5, "{closest}");
+    println!("closest: {closest:.3} of the way to the edge of the bounds");
+}
+
+/// Bounds for a person.
+fn shown(found: &Found) -> String {
+    let end = found.for_ever.map_or("nothing for ever".to_owned(), |f| {
+        format!("in the end {:.4} to {:.4}", f.low, f.high)
+    });
+    format!("f in {:.4} to {:.4} Hz, {end}", found.f.low, found.f.high)
+}
+
+/// The same with governors that have a dead band, a limited rate and a limited output, each alone
+/// and all together.
+#[test]
+fn no_fleet_leaves_its_bounds_on_limited_governors() {
+    let dead = Governor {
+        deadband_hz: 0.015,
+        ..Governor::LINEAR
+    };
+    let slow = Governor {
+        rate_gw_per_s: 0.3,
+        ..Governor::LINEAR
+    };
+    let full = Governor {
+        output_gw: [-0.3, 1.2],
+        ..Governor::LINEAR
+    };
+    let all = Governor {
+        deadband_hz: 0.015,
+        rate_gw_per_s: 0.4,
+        output_gw: [-0.4, 1.4],
+    };
+    let losses: [(Governor, &[f64]); 4] = [
+        (dead, &[0.0, 0.8, 1.6, 2.16]),
+        (slow, &[0.0, 0.8, 1.2, 1.6]),
+        (full, &[0.0, 0.8, 1.2, 1.6, 2.0]),
+        (all, &[0.0, 0.8, 1.2]),
+    ];
+    for (number, (governor, losses)) in losses.into_iter().enumerate() {
+        let mut closest = 0.0f64;
+        for (loss_number, low) in losses.iter().enumerate() {
+            let loss = Interval::hull(*low, low + 0.04);
+            let setting = Setting::honest(loss, governor);
+            let found = examine(&case(setting), RESOLUTION).expect("bounds");
+            println!("{governor:?}, {low} GW: {found}", found = shown(&found));
+            for draw in 0..4 {
+                let seed = (number * 1000 + loss_number * 100 + draw) as u64;
+                for malice in [
+                    Malice::Random,
+                    Malice::LowAndLate,
+                    Malice::HighAndEarly,
+                    Malice::Pump,
+                    Malice::Swing(3.0 + draw as f64),
+                    Malice::TwoGroups,
+                ] {
+                    let chargers = [1, 2, 12][draw % 3];
+                    let went = run(seed, malice, chargers, setting, &found);
+                    closest = closest.max(went);
+                }
+            }
+        }
+        assert!(closest > 0.5, "{governor:?}: {closest}");
+        println!("{governor:?}: closest {closest:.3}");
+    }
+}
+
+/// The same with chargers that do as they like. That these bounds are needed: bounds for honest
+/// fleets are left.
+#[test]
+fn no_fleet_with_a_hostile_share_leaves_its_bounds() {
+    let mut closest = 0.0f64;
+    let mut beyond = 0.0f64;
+    for (number, low) in [0.0, 0.8, 1.6, 2.16].into_iter().enumerate() {
+        let loss = Interval::hull(low, low + 0.04);
+        let honest = Setting::honest(loss, Governor::LINEAR);
+        let hostile = Setting {
+            hostile_share: 0.05,
+            ..honest
+        };
+        let found = examine(&case(hostile), RESOLUTION).expect("bounds");
+        let narrower = examine(&case(honest), RESOLUTION).expect("bounds");
+        println!("{low} GW: {}", shown(&found));
+        assert!(narrower.f.low > found.f.low && narrower.f.high <= found.f.high);
+        beyond = beyond.max(found.f.high - narrower.f.high);
+        for draw in 0..3 {
+            let seed = (5000 + number * 100 + draw) as u64;
+            for malice in [
+                Malice::Random,
+                Malice::LowAndLate,
+                Malice::HighAndEarly,
+                Malice::Pump,
+                Malice::Swing(3.0 + draw as f64),
+                Malice::TwoGroups,
+            ] {
+                let chargers = [20, 41][draw % 2];
+                closest = closest.max(run(seed, malice, chargers, hostile, &found));
+            }
+        }
+    }
+    assert!(closest > 0.5, "{closest}");
+    // At rest 5 % of 1.4 GW push f up by 0.07 / 6 Hz at least; an honest fleet gives nothing there.
+    assert!(beyond > 0.07 / 6.0, "{beyond}");
+    println!("closest: {closest:.3} of the way to the edge of the bounds");
+}
