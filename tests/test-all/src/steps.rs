@@ -132,7 +132,7 @@ impl Step {
     const fn with(self, environment: &'static [(&'static str, &'static str)]) -> Self {
         let action = match &self.action {
             Action::Cargo { arguments, .. } => Action::Cargo {
-                arguments: *arguments,
+                arguments,
                 environment,
             },
             other => *other,

@@ -37,7 +37,7 @@ pub fn collect(
             unpacked(&mut rest).ok_or_else(|| Lost(format!("rank {rank} sent half an answer")))?;
         by_rank.push(answers.into_iter());
     }
-    let count = by_rank.iter().map(|answers| answers.len()).sum();
+    let count = by_rank.iter().map(ExactSizeIterator::len).sum();
     let ranks = by_rank.len();
     let mut all = Vec::with_capacity(count);
     for item in 0..count {
