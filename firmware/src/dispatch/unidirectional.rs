@@ -25,9 +25,9 @@ pub const fn current_ma(participation: Participation, limit_ma: u32, threshold: 
     Floor::new(threshold).current_ma(participation, limit_ma)
 }
 
-/// What a paused charger waits for beyond its threshold \[mA\]. The noise of a reading, 1 mHz either
-/// way, is worth 130 mA of 32 A by a droop of 0.5 Hz. The fleet's mean falls short by so much of a
-/// charger's rating at most, and only where less than 6 A and this is wanted.
+/// What a paused charger waits for beyond its threshold \[mA\]. The noise of a reading, 1 mHz
+/// either way, is worth 130 mA of 32 A by a droop of 0.5 Hz. The fleet's mean falls short by so
+/// much of a charger's rating at most, and only where less than 6 A and this is wanted.
 pub const RESUME_MA: u32 = 200;
 
 /// Chooses between 6 A and a pause, and knows what it chose.

@@ -264,18 +264,23 @@ impl<R: Registers> Ade7953<R> {
     /// The median of the samples of the last five periods \[µHz\]; the newest, if they are too few.
     fn median(&self, now_ms: u32) -> Option<i32> {
         let fresh = |at_ms: u32| now_ms.wrapping_sub(at_ms) < SAMPLES as u32 * SAMPLE_MS;
-        let mut sorted = heapless::Vec::<i32, SAMPLES>::new();
+        let mut young = heapless::Vec::<i32, SAMPLES>::new();
         for (deviation, at_ms) in &self.samples {
             if fresh(*at_ms) {
                 // As many as there are samples fit.
-                let _ = sorted.push(*deviation);
+                let _ = young.push(*deviation);
             }
         }
-        if sorted.len() < 3 {
-            return sorted.last().copied();
+        let half = young.len() / 2;
+        if young.len() < 3 {
+            return young.last().copied();
         }
-        sorted.sort_unstable();
-        sorted.get(sorted.len() / 2).copied()
+        // By counting: sorting would compile a panic in. At most half of the samples lie below the
+        // median, and with its equals more than half.
+        let below = |value: i32| young.iter().filter(|other| **other < value).count();
+        let up_to = |value: i32| young.iter().filter(|other| **other <= value).count();
+        let mut candidates = young.iter().copied();
+        candidates.find(|value| below(*value) <= half && up_to(*value) > half)
     }
 }
 

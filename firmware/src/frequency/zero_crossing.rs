@@ -41,8 +41,8 @@ pub const CYCLES_DEFAULT: u8 = 5;
 pub const TIMER_HZ_MAX: u32 = 200_000_000;
 /// Slowest timer \[Hz\]: below, one timer tick is worth more than 50 mHz over one cycle.
 pub const TIMER_HZ_MIN: u32 = 50_000;
-/// Time without a crossing after which the mains is not there \[ms\]. Younger readings are judged by
-/// the gate.
+/// Time without a crossing after which the mains is not there \[ms\]. Younger readings are judged
+/// by the gate.
 pub const GONE_MS: u32 = 1_000;
 /// Fastest change of a frequency that is believed \[Hz/s\], as at the gate.
 pub const RATE_HZ_PER_S: u32 = GateLimits::DEFAULT.rate_uhz_per_s / MICRO as u32;

@@ -6,12 +6,14 @@
 //! | what | where it is counted |
 //! |---|---|
 //! | dead time, ramp, wait of the pilot | in the delay of the header, [`Spec::command_delay_s`] |
-//! | the floor of 6 A | chargers pause or draw 6 A by serial, so that the mean is right but for their own hysteresis: too much, `RESUME_MA` of the rating, from `1 - (6 A + RESUME_MA) / rating` on |
+//! | the floor of 6 A | nowhere: chargers pause or draw 6 A by serial, so that the mean is right |
+//! | a paused charger waits for its margin m | too much: `m / rating`, where `6 A + m` is wanted |
 //! | a paused car waits for 6 A and more | too much: `1 - u`, from `1 - (6 A + wait) / rating` on |
 //! | a car draws less than its charger's rating | too little: `min(u, 1 - draw)` |
 //! | a share of cars pauses by itself | too much: `share (1 - u)` |
 //! | the contactor | nothing: a pause of the response leaves it as it is |
 //!
+//! m is `RESUME_MA`: it counts from `1 - (6 A + m) / rating` on.
 //! The chargers' mean at the floor is `firmware::dispatch::fleet`'s. The proof allows
 //! `participation u + participation_absolute`. All are straight lines in u between the places where
 //! they begin, so the worst place is one of those.

@@ -265,7 +265,7 @@ def misfit(images):
         (images.uni, uni, (), "table", False),
         (images.uni, bi, {"direction", "power"}, "droop-misfit", True),
         (images.bi, uni, {"direction", "power"}, "droop-misfit", True),
-        (images.uni, chip, {"meter-error"} - {"meter-error"}, "table", False),
+        (images.uni, chip, (), "table", False),
         (images.uni_chip, uni, {"meter-error"}, "droop-misfit", True),
         (images.uni, b"", (), "droop-no-table", False),
         (images.uni, uni[:-1] + bytes([uni[-1] ^ 1]), (), "droop-no-table", False),

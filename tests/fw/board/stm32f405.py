@@ -87,6 +87,7 @@ class Board:
         self.sent_us = 0.0
         self.byte = bytearray()
         self.converted = self.polls = 0
+        self.cut, self.halting = None, False
         self.received = []
         self.selected = False
         self.tape = []
@@ -168,7 +169,8 @@ class Board:
             self.mains.cross()
         while self.events and self.events[0][0] <= t:
             self.events.pop(0)[1](self)
-        if self.us >= self.until_us or self.bitten() or self.pending is not None:
+        self.halting = self.us >= self.until_us or self.bitten() or self.pending is not None
+        if self.halting:
             self.uc.emu_stop()
 
     def turn(self):
@@ -293,9 +295,16 @@ class Board:
 
     def load(self, word):
         if word == TIM2 + 0x24:
-            self.looping = True
-            self.turn()
-            return self.told(b"T", int(self.count(TIM2, self.us)) & 0xFFFFFFFF)
+            # The emulator does an instruction again in which it was stopped: the same reading, not another.
+            if self.cut is None:
+                self.looping = True
+                self.turn()
+                now = self.told(b"T", int(self.count(TIM2, self.us)) & 0xFFFFFFFF)
+                self.cut = now if self.halting else None
+                return now
+            now, self.cut = self.cut, None
+            return now
+        self.cut = None
         if word == TIM5 + 0x10:
             return self.told(b"S", self.status) if self.on(TIM5) else 0
         if word == TIM5 + 0x34:

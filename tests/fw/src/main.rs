@@ -97,8 +97,8 @@ enum Command {
         #[arg(long)]
         bless: bool,
     },
-    /// The unmodified images on an emulated board: scenarios that each state what must hold, and the
-    /// host on the same captures, equal to the bit
+    /// The unmodified images on an emulated board: scenarios that each state what must hold, and
+    /// the host on the same captures, equal to the bit
     Board {
         /// Scenarios [default: all but those that take minutes]
         scenarios: Vec<String>,

@@ -169,6 +169,28 @@ fn a_step_of_the_phase_in_one_period_is_no_frequency() {
     }
 }
 
+proptest::proptest! {
+    #[test]
+    fn the_median_is_that_of_the_sorted_samples(periods in proptest::collection::vec(4_000u16..5_000, 1..12)) {
+        let mut fake = Fake::default();
+        let mut chip = Ade7953::new(&mut fake);
+        let mut all = vec![];
+        for (n, period) in (0u32..).zip(&periods) {
+            chip.registers.period = *period;
+            chip.poll(SAMPLE_MS * n);
+            all.push(deviation_uhz(*period).expect("a period"));
+        }
+        let now_ms = SAMPLE_MS * (periods.len() as u32 - 1);
+        let last = all.len().saturating_sub(SAMPLES);
+        let mut kept = all.split_off(last);
+        let newest = kept.last().copied();
+        let few = kept.len() < 3;
+        kept.sort_unstable();
+        let median = if few { newest } else { kept.get(kept.len() / 2).copied() };
+        proptest::prop_assert_eq!(chip.median(now_ms), median);
+    }
+}
+
 #[test]
 fn without_polls_the_reading_is_the_register() {
     let mut fake = Fake::default();
