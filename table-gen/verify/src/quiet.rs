@@ -33,9 +33,10 @@ pub(super) fn claim(table: &TableView<'_>, spec: &Spec) -> Option<Claim> {
         bound: Some(most),
         limit: Some(limit),
         unit: "changes".into(),
-        statement: "a charger's command changes at most so often by 5 % and more in any 300 s, \
-                    proven from the times between decisions"
-            .to_owned(),
+        statement:
+            "a charger's command changes at most so often by 5 % and more in any 300 s of its \
+                    clock, proven from the times between decisions"
+                .to_owned(),
         reason,
     })
 }
