@@ -104,7 +104,8 @@ pub(super) fn print(verdict: &Verdict) {
     if let Some(share) = verdict.hostile_share {
         output::line(format_args!(
             "assumed: {} % of the chargers do as they like",
-            100.0 * share
+            // Without the last digits of the product.
+            (1e8 * share).round() / 1e6
         ));
     }
     let mut table = output::table(&["claim", "holds", "bound", "limit", "unit"]);

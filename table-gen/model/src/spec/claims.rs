@@ -61,8 +61,8 @@ pub struct UncertaintySpec {
     /// Unit: 1. Allowed: a number from 0.5 to 0.999999999999, or none. Default: none.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub participation_confidence: Option<f64>,
-    /// Share of the chargers that does as it likes at all times: the opposite, nothing, or
-    /// whatever harms most. Absent: none.
+    /// Share of the chargers that does as it likes from the event on: the opposite, nothing, or
+    /// whatever harms most. Before it the grid is at rest with them. Absent: none.
     ///
     /// Unit: 1. Allowed: a number from 0 to 1, or none. Default: none.
     #[serde(skip_serializing_if = "Option::is_none")]
