@@ -260,7 +260,7 @@ fn print(spec: &Spec, answer: &Answer, simulated: Option<&Runs>) {
             table.add_row(vec![
                 name.to_owned(),
                 format!("{:.9}", layer.lower_bound),
-                layer.how.clone(),
+                layer.how.replace("; ", ";\n").replace(": a ", ":\na "),
             ]);
         }
     }
