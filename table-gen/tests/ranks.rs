@@ -73,7 +73,7 @@ fn two_and_three_ranks_find_what_one_finds() {
 }
 
 #[test]
-fn ranks_share_out_a_scorecard_and_a_sweep() {
+fn ranks_share_out_a_scorecard_a_sweep_and_proofs() {
     let table = concat!(env!("CARGO_MANIFEST_DIR"), "/../firmware/tables/gb-bi.bin");
     let scorecard = ["compare", "gb-bi", "--table", table, "--json"];
     let short = ["--loss-gw", "1.0,1.3", "--inertia", "2.8,4"];
@@ -82,7 +82,18 @@ fn ranks_share_out_a_scorecard_and_a_sweep() {
     let sweep = ["budget", "paper-bi", "--sweep", "--json"];
     let three = ["--widths", "3", "--periods", "1.5,2,3", "--errors", "0"];
     let sweep = [&sweep[..], &three].concat();
-    for arguments in [scorecard, sweep] {
+    let folder = tempfile::tempdir().unwrap();
+    let losses = folder.path().join("losses.csv");
+    // One that is proven and two that are not: the table is for 2 GW.
+    std::fs::write(&losses, "loss_gw,weight\n1.7,2\n2.0,1\n2.6,1\n").unwrap();
+    let table = concat!(
+        env!("CARGO_MANIFEST_DIR"),
+        "/../firmware/tables/paper-bi.bin"
+    );
+    let losses = losses.to_str().unwrap();
+    let proofs = ["prob", table, "--spec", "paper-bi", "--json"];
+    let proofs = [&proofs[..], &["--loss", losses]].concat();
+    for arguments in [scorecard, sweep, proofs] {
         let alone = Command::new(PROGRAM).args(&arguments).output().unwrap();
         assert!(alone.status.success() && alone.stdout.len() > 100);
         for ranks in 2..=3 {

@@ -6,14 +6,14 @@ use model::flow::{Flow, apply, product, tube};
 use model::interval::Interval;
 use model::plant::Plant;
 use model::spec::Spec;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use verify::VerifyError;
 use verify::response::{Found, LOSS_BAND_GW, examine_all};
 
 use crate::loss::LossBand;
 
 /// What is proven for a band of losses.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct BandProof {
     /// The band.
     #[serde(flatten)]

@@ -3,10 +3,10 @@
 use std::path::Path;
 
 use model::spec::LOSS_SYNTHETIC;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 /// Losses of sizes in a band.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct LossBand {
     /// Least size \[GW\].
     pub low_gw: f64,

@@ -14,6 +14,7 @@ use serde::Serialize;
 use verify::VerifyError;
 
 use super::files::write_one;
+use super::shares::Job;
 use super::{Failure, Overrides, output, prob_figure, progress};
 use model::spec::Spec;
 
@@ -97,7 +98,22 @@ pub(super) fn run(args: &ProbArgs) -> Result<(), Failure> {
     let table = TableView::parse(&bytes)
         .map_err(|error| Failure::BadInput(format!("the firmware rejects the table: {error:?}")))?;
     let bar = progress::share("prob");
-    let answer = analysis::answer(&table, &spec, &question, &|done| bar(done)).map_err(failure)?;
+    let job = Job::join();
+    let go_on = |done| {
+        if job.tells() {
+            bar(done)
+        } else {
+            !progress::interrupted()
+        }
+    };
+    let proofs = job.answers(&analysis::bands_of(&spec, &question), |own| {
+        analysis::proofs(&table, &spec, &question, own, &go_on).map_err(failure)
+    })?;
+    let Some(proofs) = proofs else {
+        return Ok(());
+    };
+    let answer = analysis::answer(&table, &spec, &question, proofs, &go_on);
+    let answer = answer.map_err(failure)?;
     exported(args, &spec, &answer)?;
     if let Some(path) = &args.figure {
         let absolute = spec.uncertainty.participation_absolute;

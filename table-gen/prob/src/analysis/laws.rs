@@ -45,26 +45,50 @@ impl OfDraws {
     }
 }
 
+/// What is proven of some bands.
+pub(super) fn proofs(
+    table: &TableView<'_>,
+    spec: &Spec,
+    question: &Question,
+    bands: &[LossBand],
+    go_on: &dyn Fn(f64) -> bool,
+) -> Result<Vec<BandProof>, AnalysisError> {
+    let laws = Laws::new(table, spec, question);
+    let each = bands.iter().enumerate().map(|(index, band)| {
+        let share = index as f64 / bands.len() as f64;
+        laws.proven(*band, &|| go_on(share))
+    });
+    each.collect()
+}
+
 /// The layers of laws by games.
 pub(super) fn of_laws(
     table: &TableView<'_>,
     spec: &Spec,
     question: &Question,
+    proofs: Vec<BandProof>,
     go_on: &dyn Fn(f64) -> bool,
 ) -> Result<Answer, AnalysisError> {
-    let header = table.header();
-    let laws = Laws {
-        table,
-        spec,
-        question,
-        tick_s: f64::from(header.tick_ms) / 1e3,
-        period_ticks: u32::from(header.period_ticks),
-    };
-    laws.answer(go_on)
+    Laws::new(table, spec, question).answer(proofs, go_on)
 }
 
-impl Laws<'_> {
-    fn answer(&self, go_on: &dyn Fn(f64) -> bool) -> Result<Answer, AnalysisError> {
+impl<'a> Laws<'a> {
+    fn new(table: &'a TableView<'a>, spec: &'a Spec, question: &'a Question) -> Self {
+        let header = table.header();
+        Self {
+            table,
+            spec,
+            question,
+            tick_s: f64::from(header.tick_ms) / 1e3,
+            period_ticks: u32::from(header.period_ticks),
+        }
+    }
+
+    fn answer(
+        &self,
+        proofs: Vec<BandProof>,
+        go_on: &dyn Fn(f64) -> bool,
+    ) -> Result<Answer, AnalysisError> {
         let question = self.question;
         let certain = Losses::certain(self.spec.uncertainty.loss_gw);
         let losses = question.losses.as_ref().unwrap_or(&certain);
@@ -73,22 +97,20 @@ impl Laws<'_> {
             let proof = self.proven(certain.bands[0], &|| go_on(0.0))?;
             own = Some(self.of_draws(kind, &proof, &|| go_on(0.0))?);
         }
-        let (mut proofs, mut exact, mut drawn) = (Vec::new(), Vec::new(), Vec::new());
-        for (index, band) in losses.bands.iter().enumerate() {
-            let go_on = || go_on(index as f64 / losses.bands.len() as f64);
-            let proof = self.proven(*band, &go_on)?;
+        let (mut exact, mut drawn) = (Vec::new(), Vec::new());
+        for (index, proof) in proofs.iter().enumerate() {
+            let go_on = || go_on(index as f64 / proofs.len() as f64);
             let holds = f64::from(u8::from(proof.holds));
             exact.push(holds);
             drawn.push(match &question.participation {
                 None => holds,
                 Some(kind) => {
-                    let found = self.of_draws(kind, &proof, &go_on)?;
+                    let found = self.of_draws(kind, proof, &go_on)?;
                     let best = found.best();
                     own.get_or_insert(found);
                     best
                 }
             });
-            proofs.push(proof);
         }
         let loss = losses.mean(&exact);
         // The band of the spec is certain: a mean of one would lose roundings.

@@ -12,7 +12,7 @@ use verify::VerifyError;
 use crate::bands::{BandProof, Rate};
 use crate::chain::Chain;
 use crate::closed_loop::{ClosedLoopError, Failures, Settings};
-use crate::loss::Losses;
+use crate::loss::{LossBand, Losses};
 use crate::normal;
 use crate::participation::Participation;
 use crate::union::{all_within, draws_in, together};
@@ -129,7 +129,42 @@ pub struct Answer {
     pub steps: u32,
 }
 
-/// Answers. `go_on` is told how much is done, roughly, and may end it.
+/// Bands of losses whose proofs an answer rests on.
+#[must_use]
+pub fn bands_of(spec: &Spec, question: &Question) -> Vec<LossBand> {
+    match &question.losses {
+        Some(losses) => losses.bands.clone(),
+        None => Losses::certain(spec.uncertainty.loss_gw).bands,
+    }
+}
+
+/// What is proven of some of these bands; a band's proof does not depend on the others. `go_on` is
+/// told the share that is done.
+///
+/// # Errors
+/// A table of another spec, or one that the verifier does not cover; an end by `go_on`.
+pub fn proofs(
+    table: &TableView<'_>,
+    spec: &Spec,
+    question: &Question,
+    bands: &[LossBand],
+    go_on: &dyn Fn(f64) -> bool,
+) -> Result<Vec<BandProof>, AnalysisError> {
+    let header = verify::header_claim(table.bytes(), spec)?;
+    if !header.holds {
+        return Err(AnalysisError::Table(header.reason.unwrap_or_default()));
+    }
+    // What the spec leaves no room for is told before anything is proven.
+    noise(table, spec, question)?;
+    if table.header().always_on {
+        response::proofs(table, spec, question, bands, go_on)
+    } else {
+        laws::proofs(table, spec, question, bands, go_on)
+    }
+}
+
+/// Answers, from the [`proofs`] of all [`bands_of`] a question in their order. `go_on` is told how
+/// much is done, roughly, and may end it.
 ///
 /// # Errors
 /// See [`AnalysisError`].
@@ -137,17 +172,14 @@ pub fn answer(
     table: &TableView<'_>,
     spec: &Spec,
     question: &Question,
+    proofs: Vec<BandProof>,
     go_on: &dyn Fn(f64) -> bool,
 ) -> Result<Answer, AnalysisError> {
-    let header = verify::header_claim(table.bytes(), spec)?;
-    if !header.holds {
-        return Err(AnalysisError::Table(header.reason.unwrap_or_default()));
-    }
     let noise = noise(table, spec, question)?;
     let mut answer = if table.header().always_on {
-        response::of_response(table, spec, question, go_on)?
+        response::of_response(spec, question, proofs)
     } else {
-        laws::of_laws(table, spec, question, go_on)?
+        laws::of_laws(table, spec, question, proofs, go_on)?
     };
     answer.assumptions.extend(of_plant(spec));
     if let Some(noise) = noise {

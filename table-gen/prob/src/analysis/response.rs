@@ -5,25 +5,22 @@ use firmware::table::TableView;
 use model::spec::Spec;
 
 use super::{AnalysisError, Answer, Layer, Layers, Question};
-use crate::bands::{self, Alone};
-use crate::loss::Losses;
+use crate::bands::{self, Alone, BandProof};
+use crate::loss::{LossBand, Losses};
 use crate::participation::Drawn as _;
 use crate::union::draws_in;
 
 /// Limits whose yearly rates are shown \[Hz\]: 49.5 and 49.2 Hz.
 const LIMITS_HZ: [f64; 2] = [-0.5, -0.8];
 
-/// The layers of a response.
-pub(super) fn of_response(
+/// What is proven of some bands. The largest error comes first.
+pub(super) fn proofs(
     table: &TableView<'_>,
     spec: &Spec,
     question: &Question,
+    bands: &[LossBand],
     go_on: &dyn Fn(f64) -> bool,
-) -> Result<Answer, AnalysisError> {
-    let certain = Losses::certain(spec.uncertainty.loss_gw);
-    let losses = question.losses.as_ref().unwrap_or(&certain);
-    let horizon_s = question.settings.horizon_s;
-    let draws = draws_in(horizon_s, question.draw_interval_s);
+) -> Result<Vec<BandProof>, AnalysisError> {
     let known = spec.uncertainty.participation;
     let mut errors: Vec<f64> = match &question.participation {
         None => vec![known],
@@ -32,22 +29,35 @@ pub(super) fn of_response(
     errors.push(known);
     errors.sort_by(|a, b| b.total_cmp(a));
     errors.dedup();
+    let mut proofs = Vec::with_capacity(bands.len());
+    for (index, band) in bands.iter().enumerate() {
+        let share = index as f64 / bands.len() as f64;
+        proofs.push(bands::of_response(table, spec, *band, &errors, &|| {
+            go_on(share)
+        })?);
+    }
+    Ok(proofs)
+}
+
+/// The layers of a response.
+pub(super) fn of_response(spec: &Spec, question: &Question, proofs: Vec<BandProof>) -> Answer {
+    let certain = Losses::certain(spec.uncertainty.loss_gw);
+    let losses = question.losses.as_ref().unwrap_or(&certain);
+    let horizon_s = question.settings.horizon_s;
+    let draws = draws_in(horizon_s, question.draw_interval_s);
+    let known = spec.uncertainty.participation;
     let absolute = spec.uncertainty.participation_absolute;
     let of_draws = |error: f64| match &question.participation {
         None => 1.0,
         Some(drawn) => drawn.all_within(draws, error, absolute),
     };
-    let (mut proofs, mut proven, mut drawn) = (Vec::new(), Vec::new(), Vec::new());
-    for (index, band) in losses.bands.iter().enumerate() {
-        let share = index as f64 / losses.bands.len() as f64;
-        let proof = bands::of_response(table, spec, *band, &errors, &|| go_on(share))?;
-        let certain = f64::from(u8::from(proof.holds));
-        proven.push(certain);
+    let (mut proven, mut drawn) = (Vec::new(), Vec::new());
+    for proof in &proofs {
+        proven.push(f64::from(u8::from(proof.holds)));
         drawn.push(match proof.participation {
             Some(error) if proof.holds => of_draws(error),
             _ => 0.0,
         });
-        proofs.push(proof);
     }
     let (loss, all) = (losses.mean(&proven), losses.mean(&drawn));
     let participation = question.participation.map(|kind| {
@@ -73,7 +83,7 @@ pub(super) fn of_response(
     let rates = question.losses.iter().flat_map(|losses| {
         LIMITS_HZ.map(|limit| bands::rate(&proofs, losses.larger, alone, limit))
     });
-    Ok(Answer {
+    Answer {
         lower_bound: all,
         states: 0,
         transitions: 0,
@@ -107,5 +117,5 @@ pub(super) fn of_response(
         reach_hz: None,
         chain: None,
         steps: 0,
-    })
+    }
 }
