@@ -41,13 +41,20 @@ fn commands(place: &str, text: &str) -> Vec<Shown> {
             let named = words
                 .next()
                 .is_some_and(|word| names.iter().any(|n| n == word));
-            named && words.next().is_some_and(|word| !word.starts_with('-'))
+            named
+                && words
+                    .next()
+                    .is_some_and(|word| !word.starts_with(['-', '.']))
         });
         for command in calls.into_iter().chain(spans) {
             let command = command.split(" #").next().unwrap();
             // No word has a space in it, so that quotes are all at words' ends.
             let words = command.split_whitespace();
-            let words = words.map(|word| word.trim_matches(['"', '\'']).to_owned());
+            // A capital stands for a number.
+            let words = words.map(|word| match word.trim_matches(['"', '\'']) {
+                "N" | "X" => "1".to_owned(),
+                word => word.to_owned(),
+            });
             shown.push(Shown {
                 place: format!("{place}:{number}"),
                 words: words.collect(),
@@ -88,7 +95,7 @@ fn every_command_shown_is_one_that_is_taken() {
             }
             let kept = words
                 .iter()
-                .filter(|word| KEPT.iter().any(|k| word.starts_with(k)));
+                .filter(|word| KEPT.iter().any(|k| word.starts_with(k)) && !word.contains("NAME"));
             wrong.extend(
                 kept.filter(|path| !root().join(path).exists())
                     .map(|path| format!("{place}: there is no {path}")),

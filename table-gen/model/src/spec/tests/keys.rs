@@ -85,12 +85,18 @@ fn the_key_table_and_the_structs_have_the_same_keys() {
         "uncertainty.hostile_share=0.01",
         "uncertainty.participation_absolute=0.99",
         "uncertainty.participation_confidence=0.5",
+        "requirements.changes_per_300_s=30",
     ];
     let spec = super::with(&bands).unwrap();
     let text = toml::to_string(&spec).unwrap();
     let listed: BTreeSet<String> = reference().iter().map(|doc| doc.key.to_owned()).collect();
     let mut printed = leaves(&toml::from_str(&text).unwrap());
     printed.insert(super::super::keys::FORMULA.to_owned());
+    // A law by games alone has this one, a response most of the others.
+    let games = super::with(&["preference.recovery_per_s=1"]).unwrap();
+    printed.extend(leaves(
+        &toml::from_str(&toml::to_string(&games).unwrap()).unwrap(),
+    ));
     assert_eq!(printed, listed);
     assert_eq!(Spec::from_toml(&text, "printed", &[]).unwrap(), spec);
 }
