@@ -13,13 +13,15 @@
 //! | a share of cars pauses by itself | too much: `share (1 - u)` |
 //! | the contactor | nothing: a pause of the response leaves it as it is |
 //!
-//! m is `RESUME_MA`: it counts from `1 - (6 A + m) / rating` on.
+//! m is `RESUME_MA`, of this repository's firmware: it counts from `1 - (6 A + m) / rating` on. A
+//! spec with an ideal meter is about no product (the claim `image` says the same), and its chargers
+//! have no margin either.
 //! The chargers' mean at the floor is `firmware::dispatch::fleet`'s. The proof allows
 //! `participation u + participation_absolute`. All are straight lines in u between the places where
 //! they begin, so the worst place is one of those.
 
 use firmware::dispatch::unidirectional::RESUME_MA;
-use model::spec::{ChargerSpec, Direction, Spec};
+use model::spec::{ChargerSpec, Direction, MeterKind, Spec};
 use model::verdict::{Claim, ClaimName};
 
 /// Lowest current that a pilot offers \[A\].
@@ -88,6 +90,7 @@ fn worst(spec: &Spec) -> Worst {
     let resume = 1.0 - (FLOOR_A + charger.resume_above_floor_a) / rating_a;
     let missing = if pilot { 1.0 - charger.draw[0] } else { 0.0 };
     let waits = pilot && charger.resume_above_floor_a > 0.0;
+    let real = pilot && spec.meter.kind != MeterKind::Ideal;
     // The charger's own hysteresis: at most so many of the chargers whose threshold lies within the
     // margin pause though they should draw 6 A, or so much of the current is not drawn.
     let margin_a = f64::from(RESUME_MA) * 1e-3;
@@ -114,7 +117,7 @@ fn worst(spec: &Spec) -> Worst {
             0.0
         };
         let pausing = charger.pausing_share * (1.0 - command);
-        let own = if pilot && command >= own {
+        let own = if real && command >= own {
             margin_a / rating_a
         } else {
             0.0
@@ -123,7 +126,7 @@ fn worst(spec: &Spec) -> Worst {
             at(command.min(missing), too_little(charger)),
             at(
                 (waiting + pausing + own).min(1.0 - command),
-                too_much(charger, waits),
+                too_much(charger, waits, real),
             ),
         ]
     })
@@ -143,8 +146,14 @@ fn too_little(charger: &ChargerSpec) -> String {
     )
 }
 
-fn too_much(charger: &ChargerSpec, waits: bool) -> String {
+fn too_much(charger: &ChargerSpec, waits: bool, real: bool) -> String {
     let mut causes = Vec::new();
+    if real {
+        causes.push(format!(
+            "paused chargers that wait for {} A more than their threshold asks for",
+            f64::from(RESUME_MA) * 1e-3
+        ));
+    }
     if waits {
         causes.push(format!(
             "paused cars that wait for {} A more than 6 A, for as long as the command stays \
@@ -176,6 +185,19 @@ mod tests {
         let found = of(&[]);
         assert!(found.holds);
         assert_eq!(found.bound, Some(0.0));
+    }
+
+    #[test]
+    fn a_charger_waits_for_its_own_margin() {
+        // 0.2 A of 32 A, where 6.2 A are wanted: at u = 0.80625, of which half a percent is less.
+        let exact = ["uncertainty.participation=0.005"];
+        let found = of(&exact);
+        assert!(!found.holds);
+        assert!((found.bound.unwrap() - 0.2 / 32.0).abs() < 1e-9);
+        assert!((found.limit.unwrap() - 0.005 * 0.80625).abs() < 1e-9);
+        assert!(found.reason.unwrap().contains("0.2 A more"));
+        let ideal = [&exact[..], &["meter.kind=\"ideal\""]].concat();
+        assert!(of(&ideal).holds);
     }
 
     #[test]
