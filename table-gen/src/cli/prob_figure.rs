@@ -23,7 +23,7 @@ const BESIDE: [(f64, Colour); 5] = [
 ];
 
 /// The figure: a curve for the chain, if there is one, and one for each size of the error by the
-/// union of draws, if an error is proven. `absolute` is the error of the delivery that the proof has
+/// union of draws, if an error is proven. `absolute` is the delivery's error that the proof has
 /// beside the relative one.
 pub(super) fn figure(
     header: &Header,

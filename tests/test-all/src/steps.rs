@@ -32,7 +32,8 @@ enum Action {
 }
 
 /// Every step. To add one, add a line: `Step::cargo` for a cargo command, `Step::program` for a
-/// program of the workspace, `Step::call` for a function. The number is its budget in seconds; together they stay within [`TOTAL_MAX`].
+/// program of the workspace, `Step::call` for a function. The number is its budget in seconds;
+/// together they stay within [`TOTAL_MAX`].
 ///
 /// Everything on the host is built in the release profile: the tests play whole games (hundreds of
 /// thousands of cells, and closed loops over minutes of grid time), and so macros and build scripts

@@ -102,15 +102,15 @@ impl Preferred {
         self.law.level(Cell(cell), self.levels)
     }
 
-    /// Of the allowed inputs of a cell (bit u for level u) those nearest to the preferred one: none,
-    /// one or two.
+    /// Of the allowed inputs of a cell (bit u for level u) those nearest to the preferred one:
+    /// none, one or two.
     pub fn nearest(&self, cell: [u16; STATES], allowed: u32) -> u32 {
         nearest(allowed, self.level(cell))
     }
 
     /// Of the allowed inputs of a cell those that a leaf may give it: at most `slack` from the
-    /// preferred one. Where none is that near, all that are allowed: the leaf takes the nearest that
-    /// fits its box.
+    /// preferred one. Where none is that near, all that are allowed: the leaf takes the nearest
+    /// that fits its box.
     pub fn good(&self, cell: [u16; STATES], allowed: u32) -> u32 {
         match widened(1 << self.level(cell), self.slack) & allowed {
             0 => allowed,
