@@ -1,9 +1,10 @@
 //! Why a command did not end with 0.
 
 use model::spec::SpecError;
+use serde::{Deserialize, Serialize};
 
 /// Why a command did not end with 0.
-#[derive(Debug)]
+#[derive(Debug, Clone, Serialize, Deserialize)]
 pub(crate) enum Failure {
     /// The answer is "no".
     No(String),

@@ -52,20 +52,16 @@ impl Job {
         #[cfg(feature = "mpi")]
         if let Some(world) = &self.world {
             let own = shares::own(world, items);
-            let answers: Vec<Result<A, String>> = match work(&own) {
+            let answers: Vec<Result<A, Failure>> = match work(&own) {
                 Ok(answers) => answers.into_iter().map(Ok).collect(),
-                Err(Failure::No(why) | Failure::BadInput(why)) => {
-                    own.iter().map(|_| Err(why.clone())).collect()
-                }
+                Err(failure) => own.iter().map(|_| Err(failure.clone())).collect(),
             };
             let bytes: Result<Vec<Vec<u8>>, _> = answers.iter().map(serde_json::to_vec).collect();
             let all = shares::collect(world, &bytes.map_err(Failure::bad)?)
                 .map_err(|lost| Failure::No(lost.to_string()))?;
             let Some(all) = all else { return Ok(None) };
             let read = |bytes: &Vec<u8>| -> Result<A, Failure> {
-                serde_json::from_slice::<Result<A, String>>(bytes)
-                    .map_err(Failure::bad)?
-                    .map_err(Failure::No)
+                serde_json::from_slice::<Result<A, Failure>>(bytes).map_err(Failure::bad)?
             };
             return all.iter().map(read).collect::<Result<_, _>>().map(Some);
         }

@@ -41,6 +41,9 @@ pub enum AnalysisError {
     /// The table is of another spec.
     #[error("the table is not of this spec: {0}")]
     Table(String),
+    /// Proofs of other bands than the question's.
+    #[error("the proofs are not those of the question's bands of losses, in their order")]
+    Bands,
     /// The chain cannot be built.
     #[error(transparent)]
     Chain(#[from] ClosedLoopError),
@@ -175,6 +178,10 @@ pub fn answer(
     proofs: Vec<BandProof>,
     go_on: &dyn Fn(f64) -> bool,
 ) -> Result<Answer, AnalysisError> {
+    let proven = proofs.iter().map(|proof| proof.band);
+    if !proven.eq(bands_of(spec, question)) {
+        return Err(AnalysisError::Bands);
+    }
     let noise = noise(table, spec, question)?;
     let mut answer = if table.header().always_on {
         response::of_response(spec, question, proofs)
