@@ -14,7 +14,8 @@
 //! changes nothing while it lies less than `smallest_change` from the last command; else the
 //! command becomes the nearest of this charger's own levels. They are `smallest_change` apart and
 //! shifted by an offset of the charger's serial number, so that a fleet does not step together.
-//! So `|command - v| < smallest_change` at every tick, for every offset: the proof uses that alone.
+//! So `|command - v| < smallest_change` at every tick, for every offset, and a command is a level
+//! of its charger, 0 or 1. The proof uses that, and how evenly a fleet's offsets are spread.
 //!
 //! **Numbers.** Everything is an integer and host and device agree to the bit. A slope is rounded
 //! towards zero (below 1 µHz/s). A slope response is rounded down (below 1 ppm). A target is one
@@ -103,15 +104,21 @@ impl ResponseLaw {
         offset: LevelOffset,
     ) -> Participation {
         let (target, step) = (target.ppm(), self.smallest_change_ppm);
-        let full = Participation::ALL.ppm();
-        if target == 0 || target >= full || step == 0 {
-            return Participation::from_ppm(target);
-        }
-        if target.abs_diff(last.ppm()) < step {
+        let exact = target == 0 || target >= Participation::ALL.ppm();
+        if !exact && target.abs_diff(last.ppm()) < step {
             return last;
         }
+        self.nearest_level(target, offset)
+    }
+
+    /// The charger's own level that is nearest to a participation \[ppm\]; 0 and 1 are levels.
+    const fn nearest_level(&self, ppm: u32, offset: LevelOffset) -> Participation {
+        let step = self.smallest_change_ppm;
+        if ppm == 0 || ppm >= Participation::ALL.ppm() || step == 0 {
+            return Participation::from_ppm(ppm);
+        }
         // Levels stand at `offset + (k - 1) step`, k from 0; the lowest counts as 0.
-        let from_lowest = target + step - offset.ppm(step);
+        let from_lowest = ppm + step - offset.ppm(step);
         let level = (from_lowest + step / 2) / step;
         let above = level * step + offset.ppm(step);
         Participation::from_ppm(above.saturating_sub(step))
@@ -243,9 +250,10 @@ impl Response {
         *self = Self::new(self.law, self.tick_ms, self.offset);
     }
 
-    /// Takes note that something else is commanded.
+    /// Takes note that something else is commanded. The law goes on from its own level nearest to
+    /// that: every command it keeps is one of its own, as the proof has it.
     pub const fn impose(&mut self, command: Participation) {
-        self.command = command;
+        self.command = self.law.nearest_level(command.ppm(), self.offset);
     }
 }
 
@@ -287,6 +295,20 @@ mod tests {
         assert_eq!(third.slope_uhz_per_s(0, -1, TICK_MS), -3);
         assert_eq!(slope(i32::MIN, i32::MAX), i32::MAX);
         assert_eq!(slope(i32::MAX, i32::MIN), -i32::MAX);
+    }
+
+    /// Levels 0.05 apart, the offset of serial 0 is none: 0.62 is nearest to 0.6, which is kept
+    /// while the target is near.
+    #[test]
+    fn what_was_imposed_is_gone_on_from_by_the_nearest_level() {
+        let mut response = Response::new(LAW, TICK_MS, LevelOffset::of_serial(0));
+        response.impose(ppm(620_000));
+        // 0.05 Hz and 0.14 Hz below: 4.285714 · 0.14 = 0.59999...
+        assert_eq!(response.step(-190_000), ppm(600_000));
+        for exact in [0, 1_000_000] {
+            response.impose(ppm(exact));
+            assert_eq!(response.command, ppm(exact));
+        }
     }
 
     #[test]

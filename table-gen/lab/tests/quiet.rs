@@ -45,9 +45,9 @@ fn a_delivery_that_swings_within_the_proofs_bounds_makes_chargers_change_hundred
         let swinging = changes_most(name, bytes, loss_gw, share, 4.0);
         let steady = changes_most(name, bytes, loss_gw, 0.0, 4.0);
         println!("{name}: {swinging} changes, and {steady} with a steady delivery");
-        // Ten times the goal of 20: no proof under these hypotheses gives less.
-        assert!(swinging > 200, "{name}: {swinging}");
-        assert!(steady < 40, "{name}: {steady}");
+        // Many times the goal of 20: no proof under these hypotheses gives less.
+        assert!(swinging > 100, "{name}: {swinging}");
+        assert!(steady <= 20, "{name}: {steady}");
     }
 }
 

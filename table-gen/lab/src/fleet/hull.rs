@@ -22,10 +22,13 @@
 //! ```
 //!
 //! A command lies less than the smallest change c from its target, and is 0 or 1 exactly where the
-//! target is. It acts from d after s until the next one acts, d in \[d₁, d₂\], each time another.
+//! target is. Where the proof knows how evenly the chargers' levels are shifted
+//! (`uncertainty.level_discrepancy`), the mean of those with targets up to V⁺ is at most V⁺ and a
+//! part of c (`verify::response`, the lines), but 1 from 1 - c on; from below the same. It acts from d after s until the next one acts, d in \[d₁, d₂\], each time another.
 //! So what acts at time t was decided in \[t - d₂ - T, t - d₁\], and each charger's response lies
 //! between the least V⁻ - c and the greatest V⁺ + c of that time. So does the mean over any number
-//! of chargers, which is the convex hull. Of a participation u the grid gets anything from
+//! of chargers, which is the convex hull; where the levels are known, the mean over the fleet of
+//! which they are lies in the narrower one. Of a participation u the grid gets anything from
 //! u (1 - ρ) - α to u (1 + ρ) + α, at most everything. A share σ of the chargers that is hostile
 //! gives anything: then the rest of the fleet counts (1 - σ) times, and σ is added above.
 //!
@@ -61,6 +64,8 @@ pub struct HullConfig {
     pub participation_absolute: f64,
     /// σ: share of the chargers that does as it likes.
     pub hostile_share: f64,
+    /// How far the mean command may be from its target, as a share of the smallest change.
+    pub mean_step_share: f64,
 }
 
 /// Least and greatest of one quantity.
@@ -149,18 +154,23 @@ impl ProvenHull {
     }
 
     /// Commands for targets between two ends \[ppm\].
-    const fn commands(&self, least: Participation, most: Participation) -> Ends<u32> {
+    fn commands(&self, least: Participation, most: Participation) -> Ends<u32> {
         let change = self.config.law.smallest_change_ppm;
         let full = MICRO as u32;
-        let low = if least.ppm() == full {
-            full
-        } else {
-            least.ppm().saturating_sub(change)
+        // The hostile may be whichever chargers suit them. An offset is rounded down by less than
+        // 1 ppm.
+        let share = self.config.mean_step_share + self.config.hostile_share;
+        let step = (f64::from(change) * share).ceil() as u32 + 1;
+        let step = step.min(change);
+        let low = match least.ppm() {
+            all if all == full => full,
+            little if little <= change => 0,
+            target => target - step,
         };
-        let high = if most.ppm() == 0 {
-            0
-        } else {
-            Participation::from_ppm(most.ppm() + change).ppm()
+        let high = match most.ppm() {
+            0 => 0,
+            much if much >= full.saturating_sub(change) => full,
+            target => target + step,
         };
         (low, high)
     }
@@ -260,6 +270,7 @@ mod tests {
         participation: 0.0,
         participation_absolute: 0.0,
         hostile_share: 0.0,
+        mean_step_share: 1.0,
     };
     /// The same in parts of 10 ms.
     const LAG: [usize; 2] = [5, 7];
@@ -294,6 +305,7 @@ mod tests {
 
     /// Runs a fleet along a path of f, and shows each part's hull and mean.
     fn run(
+        config: HullConfig,
         number: usize,
         malice: Malice,
         late_parts: usize,
@@ -304,8 +316,8 @@ mod tests {
         let mut chargers: Vec<Charger> = (0..number)
             .map(|index| Charger {
                 response: Response::new(
-                    CONFIG.law,
-                    CONFIG.tick_ms,
+                    config.law,
+                    config.tick_ms,
                     LevelOffset::of_serial(index as u32),
                 ),
                 clock: any_of(&mut random, [0, PARTS - 1]),
@@ -313,7 +325,7 @@ mod tests {
                 commands: VecDeque::from([(0, 0)]),
             })
             .collect();
-        let mut hull = ProvenHull::new(CONFIG, 0);
+        let mut hull = ProvenHull::new(config, 0);
         let mut f = vec![0; LAG[1] + 1];
         let (mut now, mut slope) = (0.0f64, 0.0);
         for part in 0..2_000 {
@@ -380,7 +392,7 @@ mod tests {
         ) {
             for malice in ALL {
                 let mut outside = 0;
-                run(number, malice, 0, seed, &mut |(low, high), mean| {
+                run(CONFIG, number, malice, 0, seed, &mut |(low, high), mean| {
                     // Sums of whole ppm: a quotient rounds by less than this.
                     outside += usize::from(mean < low - 1e-12 || mean > high + 1e-12);
                 });
@@ -389,15 +401,53 @@ mod tests {
         }
     }
 
+    /// Levels a fifth apart, which 300 consecutive serial numbers shift by golden multiples: no arc
+    /// holds (1 + 0.7 log2 300)/300 < 0.023 more or less of them than its length, both ways 0.046.
+    #[test]
+    fn a_fleet_of_shifted_levels_stays_inside_the_narrower_hull() {
+        let law = ResponseLaw {
+            smallest_change_ppm: 200_000,
+            ..CONFIG.law
+        };
+        let narrow = HullConfig {
+            law,
+            mean_step_share: 0.546,
+            ..CONFIG
+        };
+        let mut nearest = f64::INFINITY;
+        for (malice, seed) in ALL
+            .iter()
+            .flat_map(|malice| [1, 2, 3].map(|seed| (*malice, seed)))
+        {
+            let mut outside = 0;
+            run(narrow, 300, malice, 0, seed, &mut |(low, high), mean| {
+                outside += usize::from(mean < low - 1e-12 || mean > high + 1e-12);
+                if high < 0.9 && high > 0.25 {
+                    nearest = nearest.min(high - mean);
+                }
+            });
+            assert_eq!(outside, 0, "{malice:?} {seed}");
+        }
+        // The hull is not so wide that nothing comes near it: half a step of levels at most.
+        assert!(nearest < 0.1, "{nearest}");
+    }
+
     /// The monitor can fail: a fleet that is a second later than assumed leaves the hull on each of
     /// a few paths.
     #[test]
     fn a_fleet_that_is_later_than_assumed_is_seen() {
         for seed in 0..5 {
             let mut outside = 0;
-            run(50, Malice::AllLate, 100, seed, &mut |(low, high), mean| {
-                outside += usize::from(mean < low || mean > high);
-            });
+            run(
+                CONFIG,
+                50,
+                Malice::AllLate,
+                100,
+                seed,
+                &mut |(low, high), mean| {
+                    outside += usize::from(mean < low || mean > high);
+                },
+            );
             assert!(outside > 0, "seed {seed}");
         }
     }

@@ -183,6 +183,7 @@ fn hull_config(spec: &Spec, table: &TableView<'_>) -> Option<HullConfig> {
         participation: uncertainty.participation,
         participation_absolute: uncertainty.participation_absolute,
         hostile_share: uncertainty.hostile(),
+        mean_step_share: uncertainty.mean_step_share(),
     })
 }
 

@@ -67,6 +67,16 @@ pub struct UncertaintySpec {
     /// Unit: 1. Allowed: a number from 0 to 1, or none. Default: none.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub hostile_share: Option<f64>,
+    /// By how much the share of the fleet whose levels' offsets lie on an arc may differ from the
+    /// arc's length, for every arc of the circle \[0, 1): how evenly `preference.smallest_change`
+    /// shifts the chargers against each other. N chargers with independent offsets are within
+    /// `sqrt(2 ln(2 / p) / N)` but for a probability p, consecutive serial numbers far within. The
+    /// fleet is those who respond, hostile ones included, each counted by its power. Absent:
+    /// offsets as an adversary likes.
+    ///
+    /// Unit: 1. Allowed: a number from 0 to 1, or none. Default: none.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub level_discrepancy: Option<f64>,
     /// Bound on the error of the state estimate, per state (f, g, l, p).
     ///
     /// Unit: Hz, GW, GW, GW. Allowed: 4 numbers, each from 0 to 10. Default: [0, 0, 0, 0].
@@ -105,6 +115,14 @@ impl UncertaintySpec {
     pub fn hostile(&self) -> f64 {
         self.hostile_share.unwrap_or(0.0)
     }
+
+    /// How far commands may be from their targets on average over a fleet without hostile chargers,
+    /// as a share of `smallest_change`: 1 where nothing is known of their levels.
+    #[must_use]
+    pub fn mean_step_share(&self) -> f64 {
+        self.level_discrepancy
+            .map_or(1.0, |discrepancy| (0.5 + discrepancy).min(1.0))
+    }
 }
 
 impl Default for UncertaintySpec {
@@ -116,6 +134,7 @@ impl Default for UncertaintySpec {
             participation_absolute: 0.0,
             participation_confidence: None,
             hostile_share: None,
+            level_discrepancy: None,
             measurement: [0.0; 4],
             actuation_delay_s: DelayRange::exactly(0.0),
             inertia_gw_s_per_hz: None,

@@ -345,6 +345,8 @@ pub(super) const KEYS: &[Key] = &[
         "probability with which participation and participation_absolute must cover chargers that err independently; absent: not asked", |s| optional(s.uncertainty.participation_confidence)),
     row("uncertainty.hostile_share", "1", Allowed::OptionalNumber(Range::closed(0.0, 1.0)),
         "share of the chargers that does as it likes, the opposite or nothing; absent: none", |s| optional(s.uncertainty.hostile_share)),
+    row("uncertainty.level_discrepancy", "1", Allowed::OptionalNumber(Range::closed(0.0, 1.0)),
+        "how unevenly the chargers' levels may be shifted against each other; absent: as an adversary likes", |s| optional(s.uncertainty.level_discrepancy)),
     row("uncertainty.measurement", STATE_UNIT, Allowed::Numbers { len: 4, each: Range::closed(0.0, 10.0) },
         "bound on the state estimate's error (f, g, l, p)", |s| KeyValue::Numbers(&s.uncertainty.measurement)),
     row("uncertainty.actuation_delay_s", "s", Allowed::NumberOrInterval(Range::closed(0.0, 60.0)),

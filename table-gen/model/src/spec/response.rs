@@ -54,11 +54,25 @@ fn check_law(spec: &Spec, origin: &Origin) -> Result<(), SpecError> {
         return Err(inconsistent(origin, key, found, allowed));
     }
     match table_fields::response(spec) {
-        Ok(_) => check_confidence(spec, origin),
+        Ok(_) => check_discrepancy(spec, origin).and_then(|()| check_confidence(spec, origin)),
         Err(error) => {
             let found = error.value.to_string();
             Err(inconsistent(origin, error.key, found, error.allowed))
         }
+    }
+}
+
+/// One charger's offset is an arc of no length: no N chargers are nearer to even than 1/N.
+fn check_discrepancy(spec: &Spec, origin: &Origin) -> Result<(), SpecError> {
+    let least = 1.0 / f64::from(spec.fleet.chargers.max(1));
+    match spec.uncertainty.level_discrepancy {
+        Some(found) if found < least => {
+            let chargers = spec.fleet.chargers;
+            let allowed = format!("at least {least:.3e} for fleet.chargers = {chargers}");
+            let key = "uncertainty.level_discrepancy";
+            Err(inconsistent(origin, key, found.to_string(), allowed))
+        }
+        _ => Ok(()),
     }
 }
 
@@ -145,6 +159,10 @@ fn check_games(spec: &Spec, origin: &Origin) -> Result<(), SpecError> {
     if let Some(confidence) = uncertainty.participation_confidence {
         let key = "uncertainty.participation_confidence";
         return refuse(key, confidence.to_string(), "none");
+    }
+    if let Some(discrepancy) = uncertainty.level_discrepancy {
+        let key = "uncertainty.level_discrepancy";
+        return refuse(key, discrepancy.to_string(), "none");
     }
     if spec.meter.kind != MeterKind::Ideal {
         let found = format!("{:?}", spec.meter.kind.name());

@@ -26,7 +26,7 @@ use model::plant::STATES;
 
 use super::fleet_loop::{FleetLoop, LossProfile};
 use super::governor::Disturbance;
-use super::lines::{Line, TOUCHES};
+use super::lines::{LINES, Line};
 
 /// Sixteen half units in the last place, relative.
 const EPS: f64 = 16.0 * f64::EPSILON;
@@ -35,9 +35,9 @@ const EPS: f64 = 16.0 * f64::EPSILON;
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Step {
     /// Lines below the delivered participation.
-    pub(super) below: [Line; TOUCHES.len()],
+    pub(super) below: [Line; LINES],
     /// Lines above it.
-    pub(super) above: [Line; TOUCHES.len()],
+    pub(super) above: [Line; LINES],
     /// Bound of |f| in the step \[Hz\].
     pub(super) f_most: f64,
     /// Bound of `|p + P u - w - D f|` in the step \[GW\].
@@ -109,12 +109,12 @@ impl Functional {
     }
 }
 
-/// Which lines a sweep uses: indices into [`TOUCHES`] for the lines below and above.
+/// Which lines a sweep uses: indices into [`Step::below`] and [`Step::above`].
 pub(super) type Choice = (usize, usize);
 
 /// All choices.
 pub(super) fn choices() -> impl Iterator<Item = Choice> {
-    (0..TOUCHES.len()).flat_map(|below| (0..TOUCHES.len()).map(move |above| (below, above)))
+    (0..LINES).flat_map(|below| (0..LINES).map(move |above| (below, above)))
 }
 
 /// Factors of samples of f before the first: their sum, the sum of their magnitudes, and what they

@@ -81,6 +81,9 @@ pub struct Assumed {
     pub participation_absolute: f64,
     /// Share of the fleet that does as it likes.
     pub hostile_share: f64,
+    /// How far a command may be from its target on average over the fleet, as a share of the
+    /// law's smallest change: 1 where nothing is known of the chargers' levels.
+    pub mean_step_share: f64,
     /// Band of the loss \[GW\].
     pub loss: Interval,
     /// How it moves.

@@ -177,6 +177,7 @@ fn case(law: &ResponseLaw, table: &TableView<'_>, spec: &Spec) -> Case {
             participation: share(assumed.participation_relative_ppm),
             participation_absolute: share(assumed.participation_absolute_ppm),
             hostile_share: spec.uncertainty.hostile(),
+            mean_step_share: spec.uncertainty.mean_step_share(),
             loss,
             profile: match assumed.loss_profile {
                 Profile::Constant => LossProfile::Constant,

@@ -34,6 +34,7 @@ pub(super) fn assumed() -> Assumed {
         participation: 0.1,
         participation_absolute: 0.0,
         hostile_share: 0.0,
+        mean_step_share: 1.0,
         loss: Interval::hull(2.0, 2.02),
         profile: LossProfile::Constant,
         initial: [0.02, 0.1, 0.06, 0.06],

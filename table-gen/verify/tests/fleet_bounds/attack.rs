@@ -53,6 +53,10 @@ pub(crate) struct Setting {
     pub(crate) governor: Governor,
     /// Share of the chargers that gives all or nothing, as it suits the adversary.
     pub(crate) hostile_share: f64,
+    /// Distance of a charger's levels \[ppm\].
+    pub(crate) smallest_change_ppm: u32,
+    /// How far the mean command is from its target, as a share of that.
+    pub(crate) mean_step_share: f64,
 }
 
 impl Setting {
@@ -61,6 +65,8 @@ impl Setting {
             loss,
             governor,
             hostile_share: 0.0,
+            smallest_change_ppm: LAW.smallest_change_ppm,
+            mean_step_share: 1.0,
         }
     }
 }
@@ -86,7 +92,7 @@ pub(crate) fn case(setting: Setting) -> Case {
             slope_most: share(LAW.slope_most_ppm),
             release_per_s: share(LAW.release_ppm) / TICK_S,
             release_least_per_s: share(LAW.release_ppm) / TICK_S,
-            smallest_change: share(LAW.smallest_change_ppm),
+            smallest_change: share(setting.smallest_change_ppm),
             rounding: 6e-6,
         },
         assumed: Assumed {
@@ -99,6 +105,7 @@ pub(crate) fn case(setting: Setting) -> Case {
             participation: DELIVERY,
             participation_absolute: 0.0,
             hostile_share: setting.hostile_share,
+            mean_step_share: setting.mean_step_share,
             loss,
             profile: LossProfile::Constant,
             initial: [0.02, 0.1, 0.06, 0.06],
@@ -158,9 +165,13 @@ pub(crate) fn run(
     });
     governor.limit(&mut x);
     let w = loss.low + (loss.high - loss.low) * rng.random::<f64>();
+    let law = ResponseLaw {
+        smallest_change_ppm: setting.smallest_change_ppm,
+        ..LAW
+    };
     let mut fleet: Vec<Charger> = (0..chargers)
         .map(|serial| Charger {
-            response: Response::new(LAW, 100, LevelOffset::of_serial(serial as u32)),
+            response: Response::new(law, 100, LevelOffset::of_serial(serial as u32)),
             phase: rng.random_range(0..steps_per_tick),
             commands: Vec::new(),
             late: 0,

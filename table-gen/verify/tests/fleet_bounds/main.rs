@@ -149,3 +149,44 @@ fn no_fleet_with_a_hostile_share_leaves_its_bounds() {
     assert!(beyond > 0.07 / 6.0, "{beyond}");
     println!("closest: {closest:.3} of the way to the edge of the bounds");
 }
+
+/// Levels 0.12 apart that 200 consecutive serial numbers shift against each other, both ways by at
+/// most 2 (1 + 0.7 log2 200)/200 < 0.064 off an even spread. That this is needed: the bounds are
+/// narrower than those for levels as an adversary likes.
+#[test]
+fn no_fleet_of_shifted_levels_leaves_its_bounds() {
+    let mut closest = 0.0f64;
+    for (number, low) in [0.0, 0.4, 1.0, 1.6, 2.16].into_iter().enumerate() {
+        let loss = Interval::hull(low, low + 0.04);
+        let shifted = Setting {
+            smallest_change_ppm: 120_000,
+            mean_step_share: 0.564,
+            ..Setting::honest(loss, Governor::LINEAR)
+        };
+        let anyhow = Setting {
+            mean_step_share: 1.0,
+            ..shifted
+        };
+        let found = examine(&case(shifted), RESOLUTION).expect("bounds");
+        println!("{low} GW: {}", shown(&found));
+        if let Some(wider) = examine(&case(anyhow), RESOLUTION) {
+            println!("  levels as an adversary likes: {}", shown(&wider));
+            assert!(wider.f.low < found.f.low || wider.f.high > found.f.high);
+        }
+        for draw in 0..2 {
+            let seed = (7000 + number * 100 + draw) as u64;
+            for malice in [
+                Malice::Random,
+                Malice::LowAndLate,
+                Malice::HighAndEarly,
+                Malice::Pump,
+                Malice::Swing(3.0 + draw as f64),
+                Malice::TwoGroups,
+            ] {
+                closest = closest.max(run(seed, malice, 200, shifted, &found));
+            }
+        }
+    }
+    assert!(closest > 0.5, "{closest}");
+    println!("closest: {closest:.3} of the way to the edge of the bounds");
+}

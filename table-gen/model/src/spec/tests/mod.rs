@@ -144,6 +144,7 @@ fn shipped_specs_state_every_key() {
                 ![
                     "uncertainty.participation_confidence",
                     "uncertainty.hostile_share",
+                    "uncertainty.level_discrepancy",
                 ]
                 .contains(&doc.key)
             })
@@ -159,6 +160,7 @@ fn shipped_specs_state_every_key() {
             .collect();
         stated.retain(|key| !key.ends_with("_per_hz") || !key.starts_with("uncertainty."));
         stated.retain(|key| !key.starts_with("charger."));
+        stated.remove("uncertainty.level_discrepancy");
         assert_eq!(stated, all, "{name}");
     }
 }
@@ -237,6 +239,7 @@ fn the_hash_changes_with_every_key() {
         "uncertainty.participation_absolute=0.01",
         "uncertainty.participation_confidence=0.5",
         "uncertainty.hostile_share=0.01",
+        "uncertainty.level_discrepancy=0.04",
         "uncertainty.measurement=[0, 0, 0, 0.01]",
         "uncertainty.actuation_delay_s=[0.1, 0.5]",
         "uncertainty.inertia_gw_s_per_hz=[2.04, 5]",
