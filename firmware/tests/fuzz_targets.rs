@@ -95,7 +95,7 @@ fn any_telemetry_is_rejected_or_a_frame() {
         participation_ppm: 1_000_000,
         set_point: WireSetPoint::PowerW(-28_000),
         faults: u16::MAX,
-        misfits: 0x1F,
+        misfits: 0x3F,
         table: Some(TableId {
             spec_hash: [0xA5; 16],
             crc: 0x1234_5678,

@@ -79,6 +79,7 @@ const INSTALLATION: Installation = Installation {
     direction: Direction::Bidirectional,
     power_w: 56_000,
     tick_most_ms: 200,
+    change_gap_ms: 0,
 };
 
 /// A hundred ticks of a charger: its last frame, and how often the watchdog was fed.
@@ -125,6 +126,14 @@ fn a_charger_as_assumed_runs_the_response() {
             METER,
             Installation {
                 power_w: 50_400,
+                ..INSTALLATION
+            },
+        ),
+        // As late as a command may act.
+        (
+            METER,
+            Installation {
+                change_gap_ms: 500,
                 ..INSTALLATION
             },
         ),
@@ -205,6 +214,15 @@ fn each_misfit_is_named_and_the_droop_is_in_force() {
             },
             1,
         ),
+        (
+            Misfits::PACE,
+            METER,
+            Installation {
+                change_gap_ms: 501,
+                ..INSTALLATION
+            },
+            1,
+        ),
     ];
     let droop = TableView::parse(GB_BI).unwrap().header().droop;
     let expected = droop.participation(State([METER.f_uhz, 0, 0, 0]));
@@ -233,6 +251,7 @@ fn several_misfits_are_all_named() {
         direction: Direction::Unidirectional,
         power_w: 22_080,
         tick_most_ms: 50,
+        change_gap_ms: 5_000,
     };
     let (frame, _) = run(meter, Some(unidirectional), 1);
     let all = Misfits::NAMES

@@ -71,6 +71,9 @@
 // Misfit: the charger's power is another.
 #define HOLDFAST_MISFIT_POWER 16
 
+// Misfit: a change of the set-point may wait too long; the provider never says so.
+#define HOLDFAST_MISFIT_PACE 32
+
 // How a call ended.
 enum holdfast_status
 #if defined(__cplusplus) || __STDC_VERSION__ >= 202311L

@@ -201,6 +201,8 @@ pub const HOLDFAST_MISFIT_TICK: u8 = 4;
 pub const HOLDFAST_MISFIT_DIRECTION: u8 = 8;
 /// Misfit: the charger's power is another.
 pub const HOLDFAST_MISFIT_POWER: u8 = 16;
+/// Misfit: a change of the set-point may wait too long; the provider never says so.
+pub const HOLDFAST_MISFIT_PACE: u8 = 32;
 
 /// Compile-time equality with the library's numbers.
 macro_rules! same {
@@ -227,6 +229,7 @@ same! {
     HOLDFAST_MISFIT_TICK => Misfits::TICK.bits(),
     HOLDFAST_MISFIT_DIRECTION => Misfits::DIRECTION.bits(),
     HOLDFAST_MISFIT_POWER => Misfits::POWER.bits(),
+    HOLDFAST_MISFIT_PACE => Misfits::PACE.bits(),
     Direction::Unidirectional => firmware::table::Direction::Unidirectional,
     Direction::Bidirectional => firmware::table::Direction::Bidirectional,
     Mode::WarmUp => firmware::fault::Mode::WarmUp,
@@ -249,6 +252,6 @@ same! {
 // A mode, phase, fault or misfit that is added must get its number above.
 const _: () = assert!(firmware::fault::Mode::ALL.len() == 8);
 const _: () = assert!(firmware::phase::Phase::ALL.len() == 7);
-const _: () = assert!(Misfits::NAMES.len() == 5);
+const _: () = assert!(Misfits::NAMES.len() == 6);
 // All but DISPATCH, CLOCK and STOPPED: the provider drives no hardware and has no clock.
 const _: () = assert!(Faults::NAMES.len() == 12 + 3);

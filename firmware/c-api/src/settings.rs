@@ -133,6 +133,8 @@ pub fn checked(config: &Config) -> Result<(ProviderConfig, ResetCause), Status> 
             direction,
             power_w: config.power_w,
             tick_most_ms: config.tick_most_ms,
+            // How often the pilot changes is the caller's business.
+            change_gap_ms: 0,
         },
         connection: Connection {
             phases: config.phases,

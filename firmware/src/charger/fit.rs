@@ -38,6 +38,9 @@ pub struct Installation {
     pub power_w: u32,
     /// Longest tick that it keeps \[ms\]: its watchdog bites no sooner than after two of them.
     pub tick_most_ms: u16,
+    /// Longest time that a change of its set-point waits for the one before \[ms\], see
+    /// [`crate::dispatch::pace`].
+    pub change_gap_ms: u16,
 }
 
 impl Installation {
@@ -46,12 +49,14 @@ impl Installation {
         direction: Direction::Unidirectional,
         power_w: 3 * 230 * 32,
         tick_most_ms: TICK_MS_MAX,
+        change_gap_ms: 0,
     };
     /// The reference charger with a power stage: 28 kW both ways, the paper's swing of 56 kW.
     pub const REFERENCE_BIDIRECTIONAL: Self = Self {
         direction: Direction::Bidirectional,
         power_w: 2 * 28_000,
         tick_most_ms: TICK_MS_MAX,
+        change_gap_ms: 0,
     };
 }
 
@@ -72,14 +77,17 @@ impl Misfits {
     pub const DIRECTION: Self = Self(1 << 3);
     /// The charger's power is another, by more than the participation's error.
     pub const POWER: Self = Self(1 << 4);
+    /// A change of the set-point may wait longer than a command may take to act.
+    pub const PACE: Self = Self(1 << 5);
 
     /// Every misfit with its name, in the order of the bits.
-    pub const NAMES: [(Self, &'static str); 5] = [
+    pub const NAMES: [(Self, &'static str); 6] = [
         (Self::METER_ERROR, "meter-error"),
         (Self::METER_LAG, "meter-lag"),
         (Self::TICK, "tick"),
         (Self::DIRECTION, "direction"),
         (Self::POWER, "power"),
+        (Self::PACE, "pace"),
     ];
 
     /// The bits, as telemetry carries them.
@@ -139,5 +147,7 @@ pub fn misfits(
     let share = u64::from(assumed.participation_relative_ppm)
         + u64::from(assumed.participation_absolute_ppm);
     found.insert_if(off > u64::from(power_w) * share, Misfits::POWER);
+    let [_, latest_ms] = assumed.actuation_delay_ms;
+    found.insert_if(installation.change_gap_ms > latest_ms, Misfits::PACE);
     found
 }

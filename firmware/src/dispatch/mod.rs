@@ -9,6 +9,7 @@ pub mod bidirectional;
 pub mod car;
 pub mod contactor;
 pub mod fleet;
+pub mod pace;
 pub mod pilot;
 pub mod power_line;
 pub mod unidirectional;

@@ -15,6 +15,7 @@ use embedded_hal::pwm::SetDutyCycle;
 use super::car::{AlwaysAsking, CarSense, CarState};
 use super::contactor::{Contactor, ContactorTimes};
 use super::fleet::Threshold;
+use super::pace::Pace;
 use super::pilot::{CURRENT_MAX_MA, CURRENT_MIN_MA, Pilot};
 use super::{Dispatch, DispatchError, LimitSource, Limits, SetPoint};
 use crate::units::{MICRO, Participation};
@@ -86,6 +87,7 @@ pub struct Unidirectional<P, O, C = AlwaysAsking> {
     contactor: Contactor<O>,
     car: C,
     floor: Floor,
+    pace: Pace,
     limits_ma: Limits,
 }
 
@@ -103,8 +105,16 @@ impl<P: SetDutyCycle, O: OutputPin> Unidirectional<P, O> {
             contactor: Contactor::new(contactor, times),
             car: AlwaysAsking,
             floor: Floor::new(threshold),
+            pace: Pace::NONE,
             limits_ma,
         }
+    }
+
+    /// The same charger, whose pilot changes at this pace.
+    #[must_use]
+    pub const fn with_pace(mut self, pace: Pace) -> Self {
+        self.pace = pace;
+        self
     }
 
     /// The same charger, asking the car.
@@ -114,6 +124,7 @@ impl<P: SetDutyCycle, O: OutputPin> Unidirectional<P, O> {
             contactor: self.contactor,
             car,
             floor: self.floor,
+            pace: self.pace,
             limits_ma: self.limits_ma,
         }
     }
@@ -150,29 +161,37 @@ impl<P: SetDutyCycle, O: OutputPin, C: CarSense> Dispatch for Unidirectional<P, 
         if !may_ask {
             return self.rest(now_ms);
         }
-        if wanted == 0 && self.limits_ma.lowest() >= CURRENT_MIN_MA {
+        let limit_ma = self.limits_ma.lowest();
+        let may_close = self.contactor.may_close(now_ms);
+        let target = if may_close { wanted } else { 0 };
+        let offered = self.pace.admit(target, limit_ma, now_ms);
+        let limited = limit_ma < CURRENT_MIN_MA || (wanted > 0 && !may_close);
+        if limited {
+            return self.pause(wanted > 0, now_ms);
+        }
+        if offered == 0 {
             // The response pauses the car, and will let it go on.
             self.pilot.offer(0).map_err(|_| DispatchError::Pilot)?;
             let held = self.contactor.hold();
             held.map_err(|_| DispatchError::Contactor)?;
             return Ok(SetPoint::Paused);
         }
-        if wanted == 0 || !self.contactor.may_close(now_ms) {
-            return self.pause(wanted > 0, now_ms);
-        }
         // First the pilot, then the contactor: it closes when a current is offered and the car
         // asks.
-        self.pilot.offer(wanted).map_err(|_| DispatchError::Pilot)?;
+        self.pilot
+            .offer(offered)
+            .map_err(|_| DispatchError::Pilot)?;
         let contact = if state == Some(CarState::C) {
             self.contactor.request(true, now_ms).map(|_closed| ())
         } else {
             self.contactor.idle()
         };
         contact.map_err(|_| DispatchError::Contactor)?;
-        Ok(SetPoint::Current { ma: wanted })
+        Ok(SetPoint::Current { ma: offered })
     }
 
     fn rest(&mut self, _now_ms: u32) -> Result<SetPoint, DispatchError> {
+        self.pace.reset();
         self.pilot.offer(0).map_err(|_| DispatchError::Pilot)?;
         self.contactor
             .idle()

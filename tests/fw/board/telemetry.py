@@ -8,7 +8,7 @@ FAULTS = (
     "bus no-signal stale stuck out-of-range implausible table-rejected outside-domain overrun clock-jump restarted "
     "dispatch misfit clock stopped"
 ).split()
-MISFITS = "meter-error meter-lag tick direction power".split()
+MISFITS = "meter-error meter-lag tick direction power pace".split()
 MODES = "warm-up table droop-outside droop-no-table hold safe release droop-misfit".split()
 
 
