@@ -1,8 +1,5 @@
 //! Any bytes on the service line of a charger, and any answers to a tool.
 
-use std::convert::Infallible;
-
-use embedded_storage::nor_flash::{ErrorType, MultiwriteNorFlash, NorFlash, ReadNorFlash};
 use firmware::telemetry::{Frame, TableId};
 use service::device::{Device, Facts};
 use service::frame::{ASK, Collector, FRAME_MAX, RECORD_MAX, encode};
@@ -10,55 +7,13 @@ use service::message::{Answer, Ask, Order, Refusal, read_answer, read_order, wri
 use service::seal::DeviceKey;
 use settings::key::Key;
 use settings::store::Store;
+use settings::testing::{Memory, RANGE, blank};
 use settings::values::Build;
 
-/// Bytes of a page.
-const PAGE: usize = 1024;
 /// The charger's key: the corpus may seal with it.
 pub const KEY: [u8; 32] = [0x5A; 32];
 /// The charger's serial number.
 pub const SERIAL: u32 = 7;
-
-/// Flash that never fails.
-#[derive(Debug, Clone)]
-struct Memory(Vec<u8>);
-
-impl ErrorType for Memory {
-    type Error = Infallible;
-}
-
-impl ReadNorFlash for Memory {
-    const READ_SIZE: usize = 1;
-
-    fn read(&mut self, offset: u32, bytes: &mut [u8]) -> Result<(), Infallible> {
-        let at = offset as usize;
-        bytes.copy_from_slice(&self.0[at..at + bytes.len()]);
-        Ok(())
-    }
-
-    fn capacity(&self) -> usize {
-        self.0.len()
-    }
-}
-
-impl NorFlash for Memory {
-    const WRITE_SIZE: usize = 4;
-    const ERASE_SIZE: usize = PAGE;
-
-    fn erase(&mut self, from: u32, to: u32) -> Result<(), Infallible> {
-        self.0[from as usize..to as usize].fill(0xFF);
-        Ok(())
-    }
-
-    fn write(&mut self, offset: u32, bytes: &[u8]) -> Result<(), Infallible> {
-        for (cell, byte) in self.0[offset as usize..].iter_mut().zip(bytes) {
-            *cell &= byte;
-        }
-        Ok(())
-    }
-}
-
-impl MultiwriteNorFlash for Memory {}
 
 struct Around;
 
@@ -84,8 +39,8 @@ impl Facts for Around {
 /// as a record to which the right checksum is added. No order is carried out unless the bytes hold
 /// its seal, and the settings stay allowed. Whether something was asked.
 pub fn run(bytes: &[u8]) -> bool {
-    let memory = Memory(vec![0xFF; 2 * PAGE]);
-    let Ok(mut store) = Store::open(memory, 0..2 * PAGE as u32, Build::REFERENCE) else {
+    let cells = blank();
+    let Ok(mut store) = Store::open(Memory(&cells), RANGE, Build::REFERENCE) else {
         panic!("blank flash suits");
     };
     assert!(store.write_device_key(&KEY).is_ok());

@@ -9,6 +9,7 @@
 //! | [`store`] | what is kept in flash: the record, the device key, the challenges' numbers |
 //! | [`config`] | values to what the firmware takes: charger, meter, times, limits |
 //! | [`orders`] | limits and the owner's override, which last for a while and are not kept |
+//! | [`testing`] | flash in memory |
 //!
 //! Nothing here allocates, recurses or panics; nothing is `unsafe`.
 #![no_std]
@@ -30,3 +31,5 @@ pub mod store;
 pub mod config;
 
 pub mod orders;
+
+pub mod testing;

@@ -36,6 +36,7 @@ mod record;
 mod replay;
 mod report;
 mod run_tables;
+mod service;
 mod shares;
 mod simulate;
 mod size_front;
@@ -98,6 +99,8 @@ enum Command {
     Formula(formula::FormulaArgs),
     /// Show chargers' telemetry, live or from recordings: as lines, or as a page
     Monitor(monitor::MonitorArgs),
+    /// Read a charger over its telemetry line: identity, status, settings; change them with its key
+    Service(service::ServiceArgs),
     /// The fallback droop and the event's end as messages of OCPP 2.1, and back
     Ocpp(ocpp::OcppArgs),
     /// Bytes by part, visits of a lookup, free flash on a list of microcontrollers
@@ -138,6 +141,7 @@ pub(crate) fn run() -> ExitCode {
         Command::Falsify(args) => falsify::run(&args),
         Command::Formula(args) => formula::run(&args),
         Command::Monitor(args) => monitor::run(&args),
+        Command::Service(args) => service::run(&args),
         Command::Ocpp(args) => ocpp::run(&args),
         Command::Budget(args) => budget::run(&args),
         Command::Inspect(args) => inspect::run(&args),

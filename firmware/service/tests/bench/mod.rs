@@ -1,64 +1,16 @@
 //! A charger's service over flash in memory, and a tool that asks it.
 
-use std::cell::RefCell;
-use std::convert::Infallible;
-use std::rc::Rc;
-
-use embedded_storage::nor_flash::{ErrorType, MultiwriteNorFlash, NorFlash, ReadNorFlash};
 use firmware::telemetry::{Frame, TableId};
 use service::device::{Device, Facts, GAP_MS};
 use service::frame::{Collector, FRAME_MAX, RECORD_MAX, encode};
 use service::message::{Answer, Ask, ORDER_MAX, Order, read_answer, write_ask, write_order};
 use service::seal::{Challenge, DeviceKey, MAC_LEN};
 use settings::store::Store;
+use settings::testing::{Cells, Memory, RANGE, blank};
 use settings::values::Build;
-
-const PAGE: usize = 1024;
 
 /// The charger's key.
 pub(crate) const KEY: DeviceKey = DeviceKey::new([0x42; 32]);
-
-/// Flash that never fails and outlives a start.
-#[derive(Debug, Clone)]
-pub(crate) struct Memory(Rc<RefCell<Vec<u8>>>);
-
-impl ErrorType for Memory {
-    type Error = Infallible;
-}
-
-impl ReadNorFlash for Memory {
-    const READ_SIZE: usize = 1;
-
-    fn read(&mut self, offset: u32, bytes: &mut [u8]) -> Result<(), Infallible> {
-        let at = offset as usize;
-        bytes.copy_from_slice(&self.0.borrow()[at..at + bytes.len()]);
-        Ok(())
-    }
-
-    fn capacity(&self) -> usize {
-        self.0.borrow().len()
-    }
-}
-
-impl NorFlash for Memory {
-    const WRITE_SIZE: usize = 4;
-    const ERASE_SIZE: usize = PAGE;
-
-    fn erase(&mut self, from: u32, to: u32) -> Result<(), Infallible> {
-        self.0.borrow_mut()[from as usize..to as usize].fill(0xFF);
-        Ok(())
-    }
-
-    fn write(&mut self, offset: u32, bytes: &[u8]) -> Result<(), Infallible> {
-        let cells = &mut self.0.borrow_mut()[offset as usize..];
-        for (cell, byte) in cells.iter_mut().zip(bytes) {
-            *cell &= byte;
-        }
-        Ok(())
-    }
-}
-
-impl MultiwriteNorFlash for Memory {}
 
 struct Around;
 
@@ -80,9 +32,8 @@ impl Facts for Around {
     }
 }
 
-fn device(memory: &Memory) -> Device<Memory> {
-    let range = 0..2 * PAGE as u32;
-    Device::new(Store::open(memory.clone(), range, Build::REFERENCE).unwrap())
+fn device(cells: &'static Cells) -> Device<Memory<'static>> {
+    Device::new(Store::open(Memory(cells), RANGE, Build::REFERENCE).unwrap())
 }
 
 /// The last order sent.
@@ -95,8 +46,8 @@ struct Sealed {
 
 /// The charger, the time and the tool.
 pub(crate) struct Bench {
-    pub(crate) device: Device<Memory>,
-    memory: Memory,
+    pub(crate) device: Device<Memory<'static>>,
+    cells: &'static Cells,
     now_ms: u32,
     sealed: Option<Sealed>,
     answer: Vec<u8>,
@@ -105,10 +56,10 @@ pub(crate) struct Bench {
 impl Bench {
     /// A charger that was never set, shortly before its clock wraps.
     pub(crate) fn new() -> Self {
-        let memory = Memory(Rc::new(RefCell::new(vec![0xFF; 2 * PAGE])));
+        let cells: &'static Cells = Box::leak(Box::new(blank()));
         Self {
-            device: device(&memory),
-            memory,
+            device: device(cells),
+            cells,
             now_ms: u32::MAX - 20_000,
             sealed: None,
             answer: Vec::new(),
@@ -127,7 +78,7 @@ impl Bench {
 
     /// The charger starts again with the same flash.
     pub(crate) fn restart(&mut self) {
-        self.device = device(&self.memory);
+        self.device = device(self.cells);
         self.now_ms = 0;
     }
 
