@@ -1,7 +1,8 @@
 //! Any bytes on the service line of a charger, and any answers to a tool.
 
 use firmware::telemetry::{Frame, TableId};
-use service::device::{Device, Facts};
+use service::device::Device;
+use service::facts::Facts;
 use service::frame::{ASK, Collector, FRAME_MAX, RECORD_MAX, encode};
 use service::message::{Answer, Ask, Order, Refusal, read_answer, read_order, write_answer};
 use service::seal::DeviceKey;

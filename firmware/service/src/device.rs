@@ -14,12 +14,12 @@
 
 use embedded_storage::nor_flash::MultiwriteNorFlash;
 use firmware::dispatch::LimitSource;
-use firmware::telemetry::{Frame, TableId};
 use settings::key::Key;
 use settings::orders::{LIMIT_MOST_MA, ORDER_MOST_S, Orders, Override};
 use settings::store::{Origin, Store, StoreError};
 use settings::values::Values;
 
+use crate::facts::Facts;
 use crate::frame::{Collector, FRAME_MAX, RECORD_MAX, encode};
 use crate::message::{
     Answer, Ask, Identity, Order, Pairs, Refusal, SETTINGS_MAX, Status, read_ask, read_order,
@@ -38,30 +38,6 @@ pub const AT_ONCE: [Key; 2] = [Key::UserLimit, Key::SiteLimit];
 /// Settings that are in force at once where they are lowered: the charger compares its power with
 /// its table's when it starts, so more waits until then.
 pub const LOWERED_AT_ONCE: [Key; 2] = [Key::CableLimit, Key::DischargeLimit];
-
-/// What the charger around it knows.
-///
-/// The implementation must answer at once.
-pub trait Facts {
-    /// Build of the firmware: version and commit. What is too long is cut.
-    fn build(&self) -> &str;
-
-    /// Serial number.
-    fn serial(&self) -> u32;
-
-    /// The table, if one was accepted.
-    fn table(&self) -> Option<TableId>;
-
-    /// The last tick.
-    fn frame(&self) -> Option<Frame>;
-
-    /// A step of a table's update: takes what was sent, writes its answer into the buffer and gives
-    /// its length. The place for an update; `None` where there is none.
-    fn update(&mut self, sent: &[u8], answer: &mut [u8]) -> Option<usize> {
-        let _ = (sent, answer);
-        None
-    }
-}
 
 /// The challenge that is open.
 #[derive(Debug, Clone, Copy)]

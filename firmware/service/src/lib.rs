@@ -5,6 +5,7 @@
 //! | [`frame`] | records between zero bytes, with a checksum, beside the telemetry's |
 //! | [`message`] | what can be asked, and the answers |
 //! | [`seal`] | who may change what a charger does: HMAC-SHA-256 over a challenge and an order |
+//! | [`facts`] | what the charger's side must be told |
 //! | [`device`] | the charger's side |
 //!
 //! `docs/service.md` is the schema and says against whom this protects. Nothing here allocates,
@@ -20,5 +21,7 @@ pub mod frame;
 pub mod message;
 
 pub mod seal;
+
+pub mod facts;
 
 pub mod device;

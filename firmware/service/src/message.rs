@@ -54,7 +54,7 @@ pub enum Ask<'a> {
         key: [u8; KEY_LEN],
     },
     /// A step of a table's update. What is in it is the update's business, and so is whether it is
-    /// authentic: a table has a signature of its own. [`crate::device::Facts::update`] takes it.
+    /// authentic: a table has a signature of its own. [`crate::facts::Facts::update`] takes it.
     Update(#[serde(borrow)] &'a [u8]),
 }
 

@@ -174,8 +174,8 @@ pub struct Judged<S> {
 
 impl<S: FrequencySource> Judged<S> {
     /// A source with the clock and jitter of these values, that was built for
-    /// [`reference::CLOCK_PPM`] and [`reference::JITTER_NS`]. Better ones are not believed: what the
-    /// source says of itself is the least.
+    /// [`reference::CLOCK_PPM`] and [`reference::JITTER_NS`]. Better ones are not believed: the
+    /// error is at least what the source says of itself.
     pub fn new(source: S, values: &Values) -> Self {
         let ppm = values
             .get(Key::Clock)

@@ -10,8 +10,8 @@
 //! ## Layout of a page
 //! | bytes | what |
 //! |---|---|
-//! | all but the last [`MARKS`] words | what the user of this flash sees, addressed from 0 without gaps |
-//! | [`MARKS`] words | marks: blank, [`BEGUN`] while the next page is being erased, 0 when it is blank |
+//! | all but the last [`MARKS`] words | what is seen, addressed from 0 without gaps |
+//! | [`MARKS`] words | marks: blank, [`BEGUN`] while the next page is erased, then 0 |
 //!
 //! A mark is struck out by clearing its bits, so the flash must allow a word to be written twice
 //! ([`MultiwriteNorFlash`]); flash with error correction over a word does not.

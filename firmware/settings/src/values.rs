@@ -207,7 +207,7 @@ mod tests {
     }
 
     proptest! {
-        /// Whatever is asked for: refused, or every value is in its range and the rest is as it was.
+        /// Whatever is asked for: refused, or every value is in its range, and the rest stays.
         #[test]
         fn values_are_always_allowed(
             changes in proptest::collection::vec((0u8..30, prop_oneof![0u32..100, any::<u32>(), 5_000u32..90_000]), 0..6),

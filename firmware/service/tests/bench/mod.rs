@@ -1,7 +1,8 @@
 //! A charger's service over flash in memory, and a tool that asks it.
 
 use firmware::telemetry::{Frame, TableId};
-use service::device::{Device, Facts, GAP_MS};
+use service::device::{Device, GAP_MS};
+use service::facts::Facts;
 use service::frame::{Collector, FRAME_MAX, RECORD_MAX, encode};
 use service::message::{Answer, Ask, ORDER_MAX, Order, read_answer, write_ask, write_order};
 use service::seal::{Challenge, DeviceKey, MAC_LEN};
