@@ -76,6 +76,7 @@ fn nothing_flows_back() {
     assert_eq!(reached("c-api"), names(&["firmware"]));
     assert_eq!(reached("settings"), names(&["firmware"]));
     assert_eq!(reached("service"), names(&["firmware", "settings"]));
+    assert_eq!(reached("update"), names(&["firmware"]));
     assert_eq!(reached("model"), names(&["firmware"]));
     assert_eq!(reached("synth"), names(&["firmware", "model"]));
     assert_eq!(reached("lab"), names(&["firmware", "model"]));

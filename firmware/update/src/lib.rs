@@ -2,12 +2,13 @@
 //!
 //! | module | holds |
 //! |---|---|
-//! | [`container`] | the bytes of a signed container: who may read it, from when to when, the table |
+//! | [`container`] | the bytes of a signed container: class, version, time, table |
 //! | [`key`] | the signature, and who is believed |
 //! | [`class`] | which kind of charger a container is for |
 //! | [`refusal`] | every reason why a container is not taken |
 //! | [`device`] | a charger's checks of a container, in order |
 //! | [`marks`] | what is written beside a container: complete, tried, confirmed |
+//! | [`layout`] | where the two slots lie |
 //! | [`slots`] | which of two slots a charger starts with, and how the other is written |
 //! | [`trial`] | when a new table has run well enough to be kept |
 //! | [`mapped`] | flash that the processor sees as memory |
@@ -30,6 +31,7 @@ pub mod class;
 pub mod container;
 pub mod device;
 pub mod key;
+pub mod layout;
 pub mod mapped;
 pub mod marks;
 pub mod refusal;

@@ -14,9 +14,10 @@ use rand_pcg::Pcg64;
 use update::class::DeviceClass;
 use update::container::{Container, HEADER_LEN, Header, SIGNATURE_LEN, Validity};
 use update::key::{DEVELOPMENT_SEED, PublicKey, Verify};
+use update::layout::Slot;
 use update::marks::TRIALS;
 use update::refusal::Refusal;
-use update::slots::{Slot, Slots};
+use update::slots::Slots;
 
 type Charger<'f> = Slots<&'f mut Flash, PublicKey>;
 

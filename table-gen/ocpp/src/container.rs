@@ -9,12 +9,14 @@
 //! | `signature` | Ed25519 over the format's name, a zero byte and the table's bytes, in Base64 |
 //!
 //! The key in the container names the signer; whoever receives it decides by a key of his own. The
-//! charger's firmware does not read containers: whatever receives the message on the charging
-//! station checks it and writes the table's sector.
+//! charger's firmware does not read these messages: whatever receives one on the charging station
+//! checks it and writes the table's sector. What the firmware itself verifies and installs is the
+//! container of the package `update`, another format by the same kinds of keys.
 
 use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;
-use ed25519_dalek::{Signature, Signer as _, SigningKey, VerifyingKey};
+pub use ed25519_dalek::SigningKey;
+use ed25519_dalek::{Signature, Signer as _, VerifyingKey};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use sha2::{Digest as _, Sha256};
@@ -89,6 +91,11 @@ pub fn public_key(text: &str) -> Result<VerifyingKey, FieldError> {
     let bytes = bytes_of("public key", text.trim())?;
     let refused = |_| FieldError::new("public key", text.trim(), "an Ed25519 key");
     VerifyingKey::from_bytes(&bytes).map_err(refused)
+}
+
+/// The private key's text.
+pub fn private_text(key: &SigningKey) -> String {
+    STANDARD.encode(key.to_bytes())
 }
 
 /// The public key's text.
@@ -179,6 +186,7 @@ mod tests {
             public_key(&format!("{text}\n")).unwrap(),
             key.verifying_key()
         );
+        assert_eq!(private_key(&private_text(&key)).unwrap(), key);
         for text in ["", "AAAA", "not base64", &"A".repeat(88)] {
             assert!(private_key(text).is_err(), "{text:?}");
         }

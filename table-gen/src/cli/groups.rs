@@ -12,7 +12,10 @@ const GROUPS: [(&str, &[&str]); 5] = [
         &["simulate", "compare", "fleet", "prob", "report"],
     ),
     ("Recorded frequencies", &["replay", "identify"]),
-    ("Chargers and back offices", &["monitor", "service", "ocpp"]),
+    (
+        "Chargers and back offices",
+        &["monitor", "service", "ocpp", "keygen", "sign", "update"],
+    ),
     (
         "Research",
         &[

@@ -21,6 +21,7 @@ mod formula;
 mod groups;
 mod identify;
 mod inspect;
+mod keygen;
 mod keys;
 mod monitor;
 mod monte_carlo;
@@ -38,11 +39,14 @@ mod report;
 mod run_tables;
 mod service;
 mod shares;
+mod sign;
+mod signing;
 mod simulate;
 mod size_front;
 mod synth;
 mod synth_report;
 mod time_left;
+mod update;
 mod verify;
 
 use std::process::ExitCode;
@@ -103,6 +107,12 @@ enum Command {
     Service(service::ServiceArgs),
     /// The fallback droop and the event's end as messages of OCPP 2.1, and back
     Ocpp(ocpp::OcppArgs),
+    /// A key pair for signing tables
+    Keygen(keygen::KeygenArgs),
+    /// A table in a signed container, for chargers of one kind
+    Sign(sign::SignArgs),
+    /// A signed container into the slots of a charger's flash, as the charger would do it
+    Update(update::UpdateArgs),
     /// Bytes by part, visits of a lookup, free flash on a list of microcontrollers
     Budget(budget::BudgetArgs),
     /// What is in a table: header, levels, jumps between neighbours, slices
@@ -143,6 +153,9 @@ pub(crate) fn run() -> ExitCode {
         Command::Monitor(args) => monitor::run(&args),
         Command::Service(args) => service::run(&args),
         Command::Ocpp(args) => ocpp::run(&args),
+        Command::Keygen(args) => keygen::run(&args),
+        Command::Sign(args) => sign::run(&args),
+        Command::Update(args) => update::run(&args),
         Command::Budget(args) => budget::run(&args),
         Command::Inspect(args) => inspect::run(&args),
         Command::Keys(args) => keys::run(&args),

@@ -9,7 +9,7 @@ use update::class::DeviceClass;
 use update::container::{Header, Validity};
 use update::device::Device;
 use update::key::{PublicKey, Verify};
-use update::slots::Layout;
+use update::layout::Layout;
 
 pub(crate) const GB_BI: &[u8] = include_bytes!("../../../tables/gb-bi.bin");
 pub(crate) const GB_UNI: &[u8] = include_bytes!("../../../tables/gb-uni.bin");
