@@ -24,6 +24,7 @@ use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 use update::container::SIGNATURE_LEN;
 use update::key::{PublicKey, Verify};
+use update::mapped::Mapped as _;
 use update::marks::TRIALS;
 use update::refusal::Refusal;
 use update::slots::Slots;
@@ -353,6 +354,10 @@ fn a_slot_that_was_to_be_erased_does_not_come_back() {
     for (step, tear) in [(7, Tear::Whole), (8, Tear::Nothing)] {
         let mut world = two.clone();
         assert_eq!(world.run(3, true, Some((step, tear))), Ran::Cut);
+        // Voided, and nothing is erased yet.
+        let (mark, rest) = world.flash.bytes().split_at(32);
+        assert!(mark.iter().all(|byte| *byte == 0));
+        assert_eq!(rest[256 - 32..][..388], containers[0]);
         world.flash.decay(SLOT_LEN as usize + 400);
         let known = device(Known(&containers, trusted()));
         let charger = Slots::start(&mut world.flash, layout(), known);
