@@ -51,7 +51,7 @@ pub(crate) const STEPS: &[Step] = &[
     Step::cargo("clippy-variants", 5, "no lint warns in the product with ADE7953 and signed set-point", "clippy -p firmware --bin holdfast --features board,ade7953,bidirectional --profile firmware --target thumbv7em-none-eabihf -- -D warnings"),
     Step::cargo("clippy-riscv", 15, "no lint warns in the pil image for RV32IMC", "clippy -p firmware --bin pil --features pil --profile firmware --target riscv32imc-unknown-none-elf -- -D warnings"),
     Step::cargo("docs", 30, "the documentation builds without warnings", "doc --workspace --no-deps --release").with(&[("RUSTDOCFLAGS", "-D warnings")]),
-    Step::cargo("build-cores", 30, "the firmware library builds for Cortex-M4F (the reference board), Cortex-M0+ and RV32IMC (no FPU)", "build -p firmware --lib --profile firmware --target thumbv7em-none-eabihf --target thumbv6m-none-eabi --target riscv32imc-unknown-none-elf"),
+    Step::cargo("build-cores", 30, "the firmware library and the update build for Cortex-M4F (the reference board), Cortex-M0+ and RV32IMC (no FPU)", "build -p firmware -p update --lib --profile firmware --target thumbv7em-none-eabihf --target thumbv6m-none-eabi --target riscv32imc-unknown-none-elf"),
     Step::cargo("host-tests", 480, "unit, property, documentation and cross-crate tests", "test --workspace --release"),
     Step::cargo("ranks", 60, "games, scorecards and sweeps on two and three ranks of an MPI job are those of one process, to the bit", "test --workspace --release --features table-gen/mpi --test ranks"),
     Step::call("python", 70, "the Python package builds, installs and gives the paper's counts; OCPP's messages fit the published schemas", python::package),
