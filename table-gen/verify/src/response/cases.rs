@@ -55,6 +55,17 @@ impl Found {
     }
 }
 
+/// The band of a loss that moves, with what was lost before the event: nothing. At rest the loss is
+/// 0, and the event takes it into its band; bounds that hold at all times must know both. A loss
+/// that does not decrease cannot come to a band below 0: then nothing.
+fn since_rest_gw(assumed: &Assumed) -> Option<Interval> {
+    let loss = assumed.loss;
+    if assumed.profile == LossProfile::NonDecreasing && loss.low < 0.0 {
+        return None;
+    }
+    Some(loss.join(Interval::ZERO))
+}
+
 /// Bounds for one case; nothing if the resolution does not fit the assumptions (readings that act
 /// within their own step, a slope window that is not whole steps), or if f may leave ±1 Hz.
 pub fn examine(case: &Case, resolution: Resolution) -> Option<Found> {
@@ -62,8 +73,18 @@ pub fn examine(case: &Case, resolution: Resolution) -> Option<Found> {
     let window = Window::new(&number)?;
     let memory = number.steps_up(resolution.memory_s);
     let moving = case.assumed.profile != LossProfile::Constant;
+    let since_rest;
     let before = if moving {
-        Some(for_ever::from_rest(&number, window, memory)?)
+        since_rest = FleetLoop::new(
+            &case.plant,
+            case.law,
+            Assumed {
+                loss: since_rest_gw(&case.assumed)?,
+                ..case.assumed
+            },
+            resolution.step_s,
+        );
+        Some(for_ever::from_rest(&since_rest, window, memory)?)
     } else {
         None
     };

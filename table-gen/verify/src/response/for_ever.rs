@@ -40,7 +40,7 @@ pub(super) fn after(samples: &Samples<'_>, past: &Past<'_>, memory: usize) -> Op
 }
 
 /// Bounds of f for ever, from rest, whenever the loss rises: R begins as the rest before the event.
-/// Nothing if none were found.
+/// Nothing if none were found. The band of the loss holds 0: what was lost before the event.
 pub(super) fn from_rest(number: &FleetLoop, window: Window, memory: usize) -> Option<Reproduced> {
     let state = number.assumed.initial.map(|radius| Interval {
         low: -radius,
@@ -69,8 +69,8 @@ pub(super) fn from_rest(number: &FleetLoop, window: Window, memory: usize) -> Op
         change_window: drift(window.length().max(1)),
         change_slope: drift(window.slope),
         net: Interval {
-            low: (-net - number.assumed.loss.low).next_down(),
-            high: (net - number.assumed.loss.low).next_up(),
+            low: (-net).next_down(),
+            high: net.next_up(),
         },
         turbine: Interval {
             low: -(l + p).next_up(),
@@ -109,7 +109,7 @@ pub(super) fn from_rest(number: &FleetLoop, window: Window, memory: usize) -> Op
 }
 
 /// Steps that lines and slopes look back.
-fn look_back(window: &Window) -> usize {
+pub(super) fn look_back(window: &Window) -> usize {
     window.oldest + window.slope + window.tick + 2
 }
 

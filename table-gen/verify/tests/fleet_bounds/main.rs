@@ -11,7 +11,7 @@ mod attack;
 use attack::{Malice, Setting, case, run};
 use model::governor::Governor;
 use model::interval::Interval;
-use verify::response::{Found, Resolution, examine};
+use verify::response::{Found, LossProfile, Resolution, examine};
 
 const RESOLUTION: Resolution = Resolution {
     step_s: 0.05,
@@ -189,4 +189,33 @@ fn no_fleet_of_shifted_levels_leaves_its_bounds() {
     }
     assert!(closest > 0.5, "{closest}");
     println!("closest: {closest:.3} of the way to the edge of the bounds");
+}
+
+/// Before the event nothing is lost. A band that does not hold 0 is entered by a jump, which
+/// counts: bounds for a loss that then moves or rises hold every fleet whose loss jumps there and stays.
+#[test]
+fn a_band_of_losses_that_does_not_hold_zero_is_entered_from_zero() {
+    let loss = Interval::hull(0.8, 0.84);
+    let setting = Setting::honest(loss, Governor::LINEAR);
+    for profile in [LossProfile::NonDecreasing, LossProfile::Band] {
+        let mut moving = case(setting);
+        moving.assumed.profile = profile;
+        let found = examine(
+            &moving,
+            Resolution {
+                step_s: 0.025,
+                ..RESOLUTION
+            },
+        )
+        .expect("bounds");
+        println!("{profile:?}: {}", shown(&found));
+        // Bounds for all times, for the event's course is not told.
+        let always = Found {
+            tube: vec![found.f; 2400],
+            ..found
+        };
+        for malice in [Malice::LowAndLate, Malice::HighAndEarly, Malice::Pump] {
+            run(42, malice, 12, setting, &always);
+        }
+    }
 }
