@@ -4,9 +4,13 @@ use std::path::PathBuf;
 
 use super::{Failure, Overrides, output, progress};
 use lab::falsify::witness;
+use lab::simulation::beyond::Loss;
+use lab::simulation::beyond::file::ScenarioFile;
+use model::interval::Interval;
 use model::spec::Spec;
 use model::verdict::{Claim, Counterexample, Verdict};
 use verify::VerifyError;
+use verify::response::LossStage;
 
 /// Arguments of `verify`.
 #[derive(Debug, clap::Args)]
@@ -25,6 +29,13 @@ pub(super) struct VerifyArgs {
     /// nothing; the table stays the one of SPEC (0 to 1)
     #[arg(long, value_name = "X", allow_negative_numbers = true)]
     hostile_share: Option<f64>,
+    /// Examine the table for these losses instead of the spec's: the [[loss]] of a shipped scenario
+    /// such as gb-2019, or of a TOML file, each lost at any time near its moment
+    #[arg(long, value_name = "FILE", conflicts_with = "hostile_share")]
+    loss_steps: Option<String>,
+    /// How near: so long before and after it [s]
+    #[arg(long, value_name = "S", default_value_t = 0.5, requires = "loss_steps")]
+    moments_s: f64,
     /// Also write the verdict to this file
     #[arg(long, value_name = "FILE")]
     verdict: Option<PathBuf>,
@@ -43,7 +54,10 @@ pub(super) fn run(args: &VerifyArgs) -> Result<(), Failure> {
         assumed.uncertainty.hostile_share = args.hostile_share;
         assumed.validate("--hostile-share")?;
     }
-    let verdict = examine_assuming(&bytes, &spec, &assumed)?;
+    let verdict = match &args.loss_steps {
+        None => examine_assuming(&bytes, &spec, &assumed)?,
+        Some(name) => examine_staged(&bytes, &spec, &stages(name, args.moments_s)?)?,
+    };
     if let Some(path) = &args.verdict {
         let text = serde_json::to_string_pretty(&verdict).map_err(Failure::bad)?;
         std::fs::write(path, text).map_err(|error| fail(path, error))?;
@@ -59,6 +73,45 @@ pub(super) fn run(args: &VerifyArgs) -> Result<(), Failure> {
 /// Verifies with progress on stderr.
 pub(super) fn examine(bytes: &[u8], spec: &Spec) -> Result<Verdict, Failure> {
     examine_assuming(bytes, spec, spec)
+}
+
+/// The losses of a scenario, each at any time so near to its moment \[s\].
+fn stages(name: &str, moments_s: f64) -> Result<Vec<LossStage>, Failure> {
+    if !(0.0..=10.0).contains(&moments_s) {
+        return Err(Failure::BadInput(format!(
+            "--moments-s = {moments_s} is out of range: 0 to 10"
+        )));
+    }
+    let file = ScenarioFile::load(name).map_err(Failure::bad)?;
+    let losses = file.losses();
+    let refuse = |what: &str| Err(Failure::BadInput(format!("{name}: {what}")));
+    if losses.is_empty() {
+        return refuse("no [[loss]]; allowed: at least one");
+    }
+    if losses.iter().any(|loss| loss.power_gw < 0.0) {
+        return refuse("a loss below 0; allowed: stages of at least 0");
+    }
+    if losses.iter().any(|loss| loss.inertia_gw_s_per_hz != 0.0) {
+        return refuse(
+            "inertia that is lost; the proof takes it as a band, uncertainty.inertia_gw_s_per_hz",
+        );
+    }
+    let stage = |loss: &Loss| LossStage {
+        earliest_s: (loss.at_s - moments_s).max(0.0),
+        latest_s: loss.at_s + moments_s,
+        power_gw: Interval::point(loss.power_gw),
+    };
+    Ok(losses.iter().map(stage).collect())
+}
+
+/// Verifies for losses in stages, with progress on stderr.
+fn examine_staged(bytes: &[u8], spec: &Spec, stages: &[LossStage]) -> Result<Verdict, Failure> {
+    let bar = progress::share("verify");
+    let verdict = verify::verify_staged(bytes, spec, stages, &|done| bar(done));
+    verdict.map_err(|error| match error {
+        VerifyError::Interrupted => Failure::No(error.to_string()),
+        _ => Failure::bad(error),
+    })
 }
 
 /// The same for a fleet that is worse than the spec's.

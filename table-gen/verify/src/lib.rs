@@ -220,6 +220,28 @@ pub fn verify_assuming(
     })
 }
 
+/// The same for a response and a loss in stages, which takes the place of the spec's loss.
+///
+/// # Errors
+/// As for [`verify`], and where table or spec is no response.
+pub fn verify_staged(
+    bytes: &[u8],
+    spec: &Spec,
+    stages: &[response::LossStage],
+    go_on: &dyn Fn(f64) -> bool,
+) -> Result<Verdict, VerifyError> {
+    let table = TableView::parse(bytes).map_err(VerifyError::Table)?;
+    if !spec.preference.always_on {
+        return Err(VerifyError::Unsupported {
+            key: "preference.always_on",
+            found: "laws by games".to_owned(),
+            remedy: "a response is",
+        });
+    }
+    let proof = response::verify_staged(&table, spec, stages, go_on)?;
+    Ok(verdict_of_response(&table, spec, spec, proof))
+}
+
 /// The claim that a table is the one that the spec asks for and that the device can use it, alone:
 /// nothing is explored. A verdict is not "verified" where it fails.
 ///
@@ -237,14 +259,24 @@ fn of_response(
     spec: &Spec,
     go_on: &dyn Fn(f64) -> bool,
 ) -> Result<Verdict, VerifyError> {
+    let proof = response::verify(table, spec, go_on)?;
+    Ok(verdict_of_response(table, made_for, spec, proof))
+}
+
+/// The verdict with what was found of f.
+fn verdict_of_response(
+    table: &TableView<'_>,
+    made_for: &Spec,
+    spec: &Spec,
+    proof: response::Proof,
+) -> Verdict {
     let header = table.header();
     let mut claims = vec![claims::header(table, made_for)];
     claims.push(dispatch::claim(spec));
     claims.extend(image::claim(table, spec));
-    let proof = response::verify(table, spec, go_on)?;
     claims.extend(proof.claims);
     claims.extend(quiet::claim(table, spec));
-    Ok(Verdict {
+    Verdict {
         verified: claims.iter().all(|claim| claim.holds),
         spec: spec.name.clone(),
         claims,
@@ -259,7 +291,7 @@ fn of_response(
         counts: proof.counts,
         tool_version: env!("CARGO_PKG_VERSION").to_owned(),
         failures: Vec::new(),
-    })
+    }
 }
 
 /// No control by tight sets, then the closed set of cells.

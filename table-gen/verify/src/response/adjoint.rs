@@ -192,7 +192,8 @@ impl Past<'_> {
         let mut loss = functional.loss;
         let mut rise_worst = loss.min(0.0);
         let [low, high] = [number.assumed.loss.low, number.assumed.loss.high];
-        let mut moving = (loss * low).min(loss * high);
+        let there = number.loss_at(k, self.repeats);
+        let mut moving = (loss * there.low).min(loss * there.high);
         let mut i = k;
         while i > 0 && (self.memory == 0 || k - i < self.memory) {
             i -= 1;
@@ -239,7 +240,12 @@ impl Past<'_> {
                 + EPS * fleet * absolute * 8.0;
             // A loss that moves as it likes takes its worst end while its factor is positive, and
             // the other while it is negative.
-            moving -= 0.5 * ((absolute + mean) * high - (absolute - mean) * low);
+            if number.assumed.profile == LossProfile::Band {
+                let here = number.loss_in_step(i, self.repeats);
+                let (plus, minus) = (0.5 * (absolute + mean), 0.5 * (absolute - mean));
+                moving -= plus * here.high - minus * here.low;
+                size += (plus * here.high).abs() + (minus * here.low).abs();
+            }
             // Within the step the sum lies between its ends, but for what changes sign.
             let ends = loss.min(loss - mean);
             loss -= mean;

@@ -150,6 +150,19 @@ pub struct FleetLoop {
     /// Largest rate of f before the event \[Hz/s\]: what the initial box allows without loss and
     /// fleet.
     pub rate_before: f64,
+    /// The loss in stages; none: it is in the band that is assumed at all times.
+    pub stages: Vec<LossStage>,
+}
+
+/// A part of the loss whose moment is known within bounds.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct LossStage {
+    /// Earliest moment \[s after the event\], at least 0.
+    pub earliest_s: f64,
+    /// Latest moment \[s after the event\].
+    pub latest_s: f64,
+    /// What is lost, at least 0 \[GW\].
+    pub power_gw: Interval,
 }
 
 impl FleetLoop {
@@ -214,7 +227,51 @@ impl FleetLoop {
             gain_most: plant.governor_gain.magnitude(),
             known: plant.known,
             rate_before: (p + damping_most * f) * inverse_inertia_most * (1.0 + 1e-12),
+            stages: Vec::new(),
         }
+    }
+
+    /// The same with a loss in stages, which must stay inside the band that is assumed.
+    pub fn with_stages(self, stages: &[LossStage]) -> Self {
+        Self {
+            stages: stages.to_vec(),
+            ..self
+        }
+    }
+
+    /// Where the loss lies in the step after a sample. `repeats`: in a step that stands for all
+    /// after the last stage.
+    ///
+    /// A stage counts as lost from its latest moment on, and as possibly lost from its earliest on;
+    /// between them it may be anything. So every order and every moment of the stages is inside.
+    pub fn loss_in_step(&self, index: usize, repeats: bool) -> Interval {
+        if self.stages.is_empty() {
+            return self.assumed.loss;
+        }
+        let (start, end) = (
+            index as f64 * self.step_s,
+            (index + 1) as f64 * self.step_s * (1.0 + 1e-12),
+        );
+        self.stages
+            .iter()
+            .fold(Interval::ZERO, |sum, stage| Interval {
+                low: if repeats || stage.latest_s <= start {
+                    (sum.low + stage.power_gw.low).next_down()
+                } else {
+                    sum.low
+                },
+                high: if repeats || stage.earliest_s <= end {
+                    (sum.high + stage.power_gw.high).next_up()
+                } else {
+                    sum.high
+                },
+            })
+    }
+
+    /// Where the loss lies at a sample, before and after it.
+    pub fn loss_at(&self, index: usize, repeats: bool) -> Interval {
+        self.loss_in_step(index.saturating_sub(1), repeats)
+            .join(self.loss_in_step(index, repeats))
     }
 
     /// Steps in a time, rounded down.

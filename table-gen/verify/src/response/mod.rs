@@ -21,6 +21,7 @@
 //! | what the spec's meter makes of f | `meter` |
 //! | one case; all cases of a proof, in parallel | `cases`, `plan` |
 //! | the same for the droop, should every charger fall back to it | `fallback` |
+//! | one event's losses, in stages | `staged` |
 //! | from the bytes to the claims | `proof` |
 
 mod adjoint;
@@ -34,13 +35,15 @@ mod lines;
 mod meter;
 mod plan;
 mod proof;
+mod staged;
 #[cfg(test)]
 mod testing;
 mod watched;
 mod window;
 
 pub use cases::{Case, Found, Resolution, examine};
-pub use fleet_loop::{Assumed, FleetLoop, LossProfile, PlantBand, RealLaw};
+pub use fleet_loop::{Assumed, FleetLoop, LossProfile, LossStage, PlantBand, RealLaw};
 pub use meter::error_hz;
 pub use plan::{LOSS_BAND_GW, Summary, cases, examine_all};
 pub use proof::{Proof, case_of, verify};
+pub use staged::{examine_staged, verify_staged};

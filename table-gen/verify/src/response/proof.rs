@@ -283,7 +283,7 @@ fn named(case: &Case) -> String {
 }
 
 /// The claims with their answers.
-fn judged(summary: &Summary, spec: &Spec) -> (Vec<Claim>, Counts) {
+pub(super) fn judged(summary: &Summary, spec: &Spec) -> (Vec<Claim>, Counts) {
     let requirements = &spec.requirements;
     let inner = Interval::hull(requirements.inner_hz[0], requirements.inner_hz[1]);
     let open = summary

@@ -323,7 +323,7 @@ impl Samples<'_> {
         let start = (net.high + fleet * most)
             .abs()
             .max((net.low + fleet * least).abs());
-        let drift = self.number.step_s * self.turbine_rate(sample) + self.rise();
+        let drift = self.number.step_s * self.turbine_rate(sample) + self.rise(k);
         let share = self.number.step_s * self.number.inverse_inertia_most;
         let f_move = share * (start + drift) / (1.0 - share * self.number.damping_most);
         let net_most = start + drift + self.number.damping_most * f_move;
@@ -340,14 +340,14 @@ impl Samples<'_> {
             above,
             f_most: (f.magnitude() + f_move) * (1.0 + 1e-9),
             net_most: net_most * (1.0 + 1e-9),
-            slack: self.slack_of(sample, spread, net_most),
+            slack: self.slack_of(sample, spread, net_most, self.rise(k)),
             rate: self.number.inverse_inertia_most * net_most * (1.0 + 1e-9),
         }
     }
 
-    /// How much the loss may rise within a step.
-    fn rise(&self) -> f64 {
-        let loss = self.number.assumed.loss;
+    /// How much the loss may rise within the step after a sample.
+    fn rise(&self, k: usize) -> f64 {
+        let loss = self.number.loss_in_step(k, self.repeats);
         match self.number.assumed.profile {
             LossProfile::Constant => 0.0,
             LossProfile::NonDecreasing | LossProfile::Band => (loss.high - loss.low).next_up(),
@@ -368,14 +368,14 @@ impl Samples<'_> {
 
     /// How far f may leave the chord in a step: a quarter of the step times the variation of f' in
     /// it, which the participation's spread, a rise of the loss, the turbine and the damping make.
-    fn slack_of(&self, sample: Option<&Sample>, spread: f64, net_most: f64) -> f64 {
+    fn slack_of(&self, sample: Option<&Sample>, spread: f64, net_most: f64, rise: f64) -> f64 {
         let number = self.number;
         let smooth = number.step_s
             * (self.turbine_rate(sample)
                 + number.damping_most * number.inverse_inertia_most * net_most);
         0.25 * number.step_s
             * number.inverse_inertia_most
-            * (number.fleet_gw * spread + self.rise() + smooth)
+            * (number.fleet_gw * spread + rise + smooth)
             * (1.0 + 1e-9)
     }
 }

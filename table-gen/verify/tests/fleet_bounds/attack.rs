@@ -7,7 +7,7 @@ use model::plant::Plant;
 use rand::RngExt;
 use rand_pcg::Pcg64;
 use rand_pcg::rand_core::SeedableRng;
-use verify::response::{Assumed, Case, Found, LossProfile, PlantBand, RealLaw};
+use verify::response::{Assumed, Case, Found, LossProfile, LossStage, PlantBand, RealLaw};
 
 const FLEET_GW: f64 = 1.4;
 const TICK_S: f64 = 0.1;
@@ -57,6 +57,23 @@ pub(crate) struct Setting {
     pub(crate) smallest_change_ppm: u32,
     /// How far the mean command is from its target, as a share of that.
     pub(crate) mean_step_share: f64,
+    /// Whether the loss comes in the stages of [`STAGES`] instead.
+    pub(crate) staged: bool,
+}
+
+/// Moments \[s\] and sizes \[GW\] of a loss in stages.
+const STAGES: [(f64, f64); 4] = [(0.0, 0.7), (0.4, 0.5), (12.0, 0.3), (20.0, 0.2)];
+/// How far a stage may be from its moment \[s\].
+const NEAR_S: f64 = 0.5;
+
+/// The stages as the proof takes them.
+pub(crate) fn stages() -> Vec<LossStage> {
+    let stage = |(at_s, gw): (f64, f64)| LossStage {
+        earliest_s: (at_s - NEAR_S).max(0.0),
+        latest_s: at_s + NEAR_S,
+        power_gw: Interval::point(gw),
+    };
+    STAGES.into_iter().map(stage).collect()
 }
 
 impl Setting {
@@ -67,6 +84,7 @@ impl Setting {
             hostile_share: 0.0,
             smallest_change_ppm: LAW.smallest_change_ppm,
             mean_step_share: 1.0,
+            staged: false,
         }
     }
 }
@@ -165,6 +183,34 @@ pub(crate) fn run(
     });
     governor.limit(&mut x);
     let w = loss.low + (loss.high - loss.low) * rng.random::<f64>();
+    // Each stage where the adversary wants it, at an end of its time or between.
+    let moments: Vec<(f64, f64)> = STAGES
+        .iter()
+        .map(|(at_s, gw)| {
+            let off = NEAR_S * [-1.0, 1.0, 2.0 * rng.random::<f64>() - 1.0][seed as usize % 3];
+            ((at_s + off).max(0.0), *gw)
+        })
+        .collect();
+    let lost = |t: f64| {
+        if setting.staged {
+            moments
+                .iter()
+                .filter(|(at_s, _)| *at_s <= t)
+                .map(|(_, gw)| gw)
+                .sum()
+        } else {
+            w
+        }
+    };
+    // In stages the bounds in time begin at the last stage's latest moment.
+    let tube_from_s = if setting.staged {
+        stages()
+            .iter()
+            .map(|stage| stage.latest_s)
+            .fold(0.0, f64::max)
+    } else {
+        0.0
+    };
     let law = ResponseLaw {
         smallest_change_ppm: setting.smallest_change_ppm,
         ..LAW
@@ -186,7 +232,7 @@ pub(crate) fn run(
     let shortest = (DELAY_S[0] / H).round() as usize;
     let age_most = (AGE_S / H).floor() as usize;
     let mut worst = 0.0f64;
-    let duration = found.tube.len() as f64 * found.step_s;
+    let duration = tube_from_s + found.tube.len() as f64 * found.step_s;
     // The law runs before the event too, so that its window is full.
     for step in 0..((1.0 + duration) / H) as usize {
         let t = step as f64 * H - 1.0;
@@ -272,7 +318,7 @@ pub(crate) fn run(
             f.push(x[0]);
             continue;
         }
-        let net = FLEET_GW * sum / chargers as f64 - w;
+        let net = FLEET_GW * sum / chargers as f64 - lost(t);
         let slope = |x: [f64; 4]| governor.derivative(&plant, &x, net);
         let k1 = slope(x);
         let at = |k: [f64; 4], h: f64| std::array::from_fn(|axis| x[axis] + h * k[axis]);
@@ -284,8 +330,13 @@ pub(crate) fn run(
         });
         governor.limit(&mut x);
         f.push(x[0]);
-        let index = (((t + H) / found.step_s) as usize).min(found.tube.len() - 1);
-        let tube = found.tube[index].join(found.tube[index.saturating_sub(1)]);
+        let since_s = t + H - tube_from_s;
+        let tube = if since_s < 0.0 {
+            found.f
+        } else {
+            let index = ((since_s / found.step_s) as usize).min(found.tube.len() - 1);
+            found.tube[index].join(found.tube[index.saturating_sub(1)])
+        };
         assert!(
             tube.contains(x[0]),
             "seed {seed} {malice:?} {chargers} chargers, {w} GW, {governor:?}: f = {} at {t:.3} s, bounds {tube:?}",

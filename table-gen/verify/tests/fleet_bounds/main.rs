@@ -8,10 +8,10 @@
 
 mod attack;
 
-use attack::{Malice, Setting, case, run};
+use attack::{Malice, Setting, case, run, stages};
 use model::governor::Governor;
 use model::interval::Interval;
-use verify::response::{Found, LossProfile, Resolution, examine};
+use verify::response::{Found, LossProfile, Resolution, examine, examine_staged};
 
 const RESOLUTION: Resolution = Resolution {
     step_s: 0.05,
@@ -189,6 +189,41 @@ fn no_fleet_of_shifted_levels_leaves_its_bounds() {
     }
     assert!(closest > 0.5, "{closest}");
     println!("closest: {closest:.3} of the way to the edge of the bounds");
+}
+
+/// Losses in stages, each within half a second of its moment.
+#[test]
+fn no_fleet_leaves_its_bounds_under_a_loss_in_stages() {
+    let full = Governor {
+        deadband_hz: 0.015,
+        output_gw: [-0.4, 1.0],
+        ..Governor::LINEAR
+    };
+    for (number, governor) in [Governor::LINEAR, full].into_iter().enumerate() {
+        let setting = Setting {
+            staged: true,
+            ..Setting::honest(Interval::hull(0.0, 1.7), governor)
+        };
+        let found = examine_staged(&case(setting), &stages(), RESOLUTION).expect("bounds");
+        println!("{governor:?} in stages: {}", shown(&found));
+        let mut closest = 0.0f64;
+        for draw in 0..6 {
+            for malice in [
+                Malice::Random,
+                Malice::LowAndLate,
+                Malice::HighAndEarly,
+                Malice::Pump,
+                Malice::Swing(3.0 + draw as f64),
+                Malice::TwoGroups,
+            ] {
+                let seed = (7000 + number * 100 + draw) as u64;
+                let chargers = [1, 2, 12][draw / 2];
+                closest = closest.max(run(seed, malice, chargers, setting, &found));
+            }
+        }
+        assert!(closest > 0.5, "{governor:?}: {closest}");
+        println!("closest: {closest:.3} of the way to the edge of the bounds");
+    }
 }
 
 /// Before the event nothing is lost. A band that does not hold 0 is entered by a jump, which
