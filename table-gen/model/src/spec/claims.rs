@@ -91,6 +91,12 @@ pub struct UncertaintySpec {
     /// Unit: GW s/Hz. Allowed: 2 numbers, each from 0.001 to 10000, or none. Default: none.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub inertia_gw_s_per_hz: Option<[f64; 2]>,
+    /// H that goes with each GW of the loss, at most: after it H is lower by anything from nothing
+    /// to this times what was lost. Absent: none goes.
+    ///
+    /// Unit: s/Hz. Allowed: a number from 0 to 10, or none. Default: none.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub inertia_lost_s_per_hz: Option<f64>,
     /// 1/R_eq anywhere in this, constant, unknown to the charger; absent: the plant's.
     ///
     /// Unit: GW/Hz. Allowed: 2 numbers, each from -100 to below 0, or none. Default: none.
@@ -138,6 +144,7 @@ impl Default for UncertaintySpec {
             measurement: [0.0; 4],
             actuation_delay_s: DelayRange::exactly(0.0),
             inertia_gw_s_per_hz: None,
+            inertia_lost_s_per_hz: None,
             governor_gain_gw_per_hz: None,
             damping_gw_per_hz: None,
             own_clocks: false,

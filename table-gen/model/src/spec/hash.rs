@@ -32,14 +32,17 @@ const NOT_OF_THE_TABLE: [&str; 2] = ["charger", "chance"];
 /// Section of which a key that is absent gives no line: it came after the first tables.
 const GOVERNOR: &str = "plant.governor";
 /// Other keys that give no line where they are absent.
-const LATER: [&str; 6] = [
+const LATER: [&str; 7] = [
     FORMULA,
     RECOVERY,
     CHANGES,
     "uncertainty.participation_confidence",
     "uncertainty.hostile_share",
     "uncertainty.level_discrepancy",
+    INERTIA_LOST,
 ];
+/// See [`LATER`].
+const INERTIA_LOST: &str = "uncertainty.inertia_lost_s_per_hz";
 const HEADING: &str = "holdfast-spec-1\n";
 
 impl Spec {

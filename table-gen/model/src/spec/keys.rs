@@ -353,6 +353,8 @@ pub(super) const KEYS: &[Key] = &[
         "time from a decision to its power; or least and most, each charger's own", |s| interval(&s.uncertainty.actuation_delay_s)),
     row("uncertainty.inertia_gw_s_per_hz", "GW s/Hz", Allowed::OptionalNumbers { len: 2, each: Range::closed(0.001, 10_000.0) },
         "band of H, unknown to the charger; absent: the plant's", |s| optionals(s.uncertainty.inertia_gw_s_per_hz.as_ref())),
+    row("uncertainty.inertia_lost_s_per_hz", "s/Hz", Allowed::OptionalNumber(Range::closed(0.0, 10.0)),
+        "H that goes with each GW of the loss, at most; absent: none", |s| optional(s.uncertainty.inertia_lost_s_per_hz)),
     row("uncertainty.governor_gain_gw_per_hz", "GW/Hz", Allowed::OptionalNumbers { len: 2, each: Range::below(-100.0, 0.0) },
         "band of 1/R_eq, unknown to the charger; absent: the plant's", |s| optionals(s.uncertainty.governor_gain_gw_per_hz.as_ref())),
     row("uncertainty.damping_gw_per_hz", "GW/Hz", Allowed::OptionalNumbers { len: 2, each: Range::closed(0.0, 1000.0) },

@@ -10,8 +10,22 @@ use super::{Domain, Spec, SpecError};
 use crate::independence::Crowd;
 use crate::table_fields;
 
+/// Least H that may be left \[GW s/Hz\].
+const INERTIA_LEAST: f64 = 0.1;
+
 /// Checks the preferred law, and that the spec's method covers what is uncertain.
 pub(super) fn check(spec: &Spec, origin: &Origin) -> Result<(), SpecError> {
+    if let Some(lost) = spec.uncertainty.inertia_lost_s_per_hz
+        && spec.inertia_band()[0] < INERTIA_LEAST
+    {
+        let key = "uncertainty.inertia_lost_s_per_hz";
+        let found = format!(
+            "{lost}, which leaves H = {} GW s/Hz",
+            spec.inertia_band()[0]
+        );
+        let allowed = format!("at least {INERTIA_LEAST} GW s/Hz after the largest loss");
+        return Err(inconsistent(origin, key, found, allowed));
+    }
     if spec.preference.always_on {
         check_law(spec, origin)
     } else {
@@ -148,6 +162,10 @@ fn check_games(spec: &Spec, origin: &Origin) -> Result<(), SpecError> {
         if let Some(band) = band {
             return refuse(key, format!("{band:?}"), "none");
         }
+    }
+    if let Some(lost) = uncertainty.inertia_lost_s_per_hz {
+        let key = "uncertainty.inertia_lost_s_per_hz";
+        return refuse(key, lost.to_string(), "none");
     }
     if uncertainty.own_clocks {
         return refuse("uncertainty.own_clocks", "true".to_owned(), "false");

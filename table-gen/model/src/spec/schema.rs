@@ -86,11 +86,21 @@ impl Spec {
         f64::from(self.fleet.chargers) * self.fleet.power_per_charger_kw / KW_PER_GW
     }
 
-    /// Least and most H \[GW s/Hz\]: the band of `[uncertainty]`, or the plant's.
+    /// Least and most H \[GW s/Hz\]: the band of `[uncertainty]`, or the plant's, less what may go
+    /// with the largest loss. The proof lets H move inside this as it likes.
     #[must_use]
     pub fn inertia_band(&self) -> [f64; 2] {
         let nominal = self.plant.inertia_gw_s_per_hz;
-        self.uncertainty.inertia_gw_s_per_hz.unwrap_or([nominal; 2])
+        let uncertainty = &self.uncertainty;
+        let [low, high] = uncertainty.inertia_gw_s_per_hz.unwrap_or([nominal; 2]);
+        match uncertainty.inertia_lost_s_per_hz {
+            None => [low, high],
+            // Downwards to a whole number of the header's units.
+            Some(lost) => {
+                let least = low - lost * uncertainty.loss_gw[1].max(0.0);
+                [(least * 1e6 - 1e-3).floor() / 1e6, high]
+            }
+        }
     }
 
     /// Least and most 1/R_eq \[GW/Hz\]: the band of `[uncertainty]`, or the plant's.

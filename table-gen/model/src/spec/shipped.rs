@@ -15,6 +15,7 @@ pub(super) const SHIPPED: &[(&str, &str)] = &[
         "gb-uni-ade7953",
         include_str!("../../../specs/gb-uni-ade7953.toml"),
     ),
+    ("gb-2019", include_str!("../../../specs/gb-2019.toml")),
     (
         "gb-uni-cars",
         include_str!("../../../specs/gb-uni-cars.toml"),

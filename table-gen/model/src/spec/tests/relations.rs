@@ -306,3 +306,27 @@ fn a_preferred_law_of_games_goes_with_every_winning_cell() {
     let error = Spec::load("gb-bi", &set).unwrap_err();
     assert_eq!(error.key(), Some("preference.recovery_per_s"), "{error}");
 }
+
+/// 4 GW s/Hz less 2.2 GW times what goes with each.
+#[test]
+fn inertia_that_goes_with_the_loss_leaves_some() {
+    let set = |lost: f64| {
+        let set = [format!("uncertainty.inertia_lost_s_per_hz={lost}")];
+        crate::spec::Spec::load("gb-bi", &set)
+    };
+    let [low, high] = set(0.1).unwrap().inertia_band();
+    assert!(
+        (low - 3.78).abs() < 2e-6 && low <= 3.78 && high == 4.0,
+        "{low}"
+    );
+    assert!(set(1.7).is_ok());
+    let error = set(1.8).unwrap_err().to_string();
+    assert!(
+        error.contains("uncertainty.inertia_lost_s_per_hz"),
+        "{error}"
+    );
+    refused(
+        &["uncertainty.inertia_lost_s_per_hz=0.1"],
+        "uncertainty.inertia_lost_s_per_hz",
+    );
+}
