@@ -21,6 +21,8 @@ const MHZ: f64 = 1e3;
 /// A fit that has a sum to reach gives up once a step brings it nearer by less than this share of
 /// what is left to go.
 const PROGRESS: f64 = 0.03;
+/// Readings that differ by less are equal \[Hz\]: far below any step of a record.
+const SAME_HZ: f64 = 1e-9;
 /// Points that are kept of those that explain the record well enough.
 const KEPT: usize = 4000;
 
@@ -43,6 +45,38 @@ impl Data {
         let course = deviations(values, &self.stages, &self.times_s);
         let pairs = self.readings_hz.iter().zip(course);
         pairs.map(|(reading, f)| MHZ * (reading - f)).collect()
+    }
+
+    /// The same with each run of equal readings taken as one: the mean of its residuals. That is
+    /// what fits are judged by.
+    ///
+    /// A reading is f rounded, and so off by at most half a step. Where f moves by less than a step
+    /// from one sample to the next, the errors of a run are nearly one error, which no number of
+    /// samples averages away; counted as many, they would tell more than the record does: ten
+    /// seconds of rest at ten samples a second would tell the rest to a tenth of what it is rounded
+    /// by. The mean of a run's errors is bounded by half a step as one reading's is, and the error
+    /// of another run is another one. Readings that noise moves have runs of one.
+    pub fn misfits(&self, values: &Values) -> Vec<f64> {
+        let residuals = self.residuals(values);
+        let mut out: Vec<f64> = Vec::with_capacity(residuals.len());
+        let mut length = 0.0;
+        let mut before = f64::NAN;
+        for (reading, residual) in self.readings_hz.iter().zip(residuals) {
+            match out.last_mut() {
+                // The readings are decimal numbers: a run repeats one of them, bit for bit, but for
+                // the subtraction of the nominal frequency.
+                Some(mean) if (reading - before).abs() < SAME_HZ => {
+                    length += 1.0;
+                    *mean += (residual - *mean) / length;
+                }
+                _ => {
+                    length = 1.0;
+                    out.push(residual);
+                }
+            }
+            before = *reading;
+        }
+        out
     }
 }
 
@@ -149,7 +183,7 @@ impl Problem<'_> {
 
     fn residuals_at(&self, logits: &DVector<f64>) -> Vec<f64> {
         let values = self.values_at(logits);
-        let residuals = self.data.residuals(&values);
+        let residuals = self.data.misfits(&values);
         self.seen
             .borrow_mut()
             .take(sum_of_squares(&residuals), &values);
@@ -213,7 +247,7 @@ pub fn fit(
     seen: &RefCell<Seen>,
 ) -> (f64, Values) {
     if free.is_empty() {
-        let sum = sum_of_squares(&data.residuals(start));
+        let sum = sum_of_squares(&data.misfits(start));
         seen.borrow_mut().take(sum, start);
         return (sum, *start);
     }
@@ -240,13 +274,13 @@ pub fn fit(
     let (problem, _) = method.minimize(problem);
     // However it ended: what counts is how well the values explain the record.
     let values = problem.values_at(&problem.logits);
-    (sum_of_squares(&data.residuals(&values)), values)
+    (sum_of_squares(&data.misfits(&values)), values)
 }
 
 /// Half-widths, as shares of the ranges, at which the sum of squares would rise by `rise` if the
 /// residuals were linear in the places; at most 1.
 pub fn half_widths(data: &Data, at: &Values, free: &[usize], rise: f64) -> Vec<f64> {
-    let base = data.residuals(at);
+    let base = data.misfits(at);
     let mut jacobian = DMatrix::zeros(base.len(), free.len());
     for (column, index) in free.iter().enumerate() {
         let range = &data.ranges[*index];
@@ -254,7 +288,7 @@ pub fn half_widths(data: &Data, at: &Values, free: &[usize], rise: f64) -> Vec<f
         let step = if place > 0.5 { -DIFFERENCE } else { DIFFERENCE };
         let mut moved = *at;
         moved[*index] = range.value(place + step);
-        for (row, (there, here)) in data.residuals(&moved).iter().zip(&base).enumerate() {
+        for (row, (there, here)) in data.misfits(&moved).iter().zip(&base).enumerate() {
             jacobian[(row, column)] = (there - here) / step;
         }
     }
@@ -274,4 +308,29 @@ pub fn half_widths(data: &Data, at: &Values, free: &[usize], rise: f64) -> Vec<f
                 .clamp(1e-6, 1.0)
         })
         .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::parameters::{ONSET, PARAMETERS, REST};
+    use super::*;
+
+    /// At rest, with readings of 1, 1, 1, 2 and 1 mHz: three runs; residuals are the readings.
+    #[test]
+    fn equal_neighbours_are_one_reading() {
+        let data = Data {
+            times_s: vec![0.0, 1.0, 2.0, 3.0, 4.0],
+            readings_hz: [0.001, 0.001, 0.001, 0.002, 0.001].to_vec(),
+            stages: Vec::new(),
+            ranges: PARAMETERS,
+        };
+        let mut values = PARAMETERS.map(|p| p.value(0.5));
+        (values[ONSET], values[REST]) = (10.0, 0.0);
+        assert_eq!(data.residuals(&values).len(), 5);
+        let misfits = data.misfits(&values);
+        assert_eq!(misfits.len(), 3);
+        for (found, expected) in misfits.iter().zip([1.0, 2.0, 1.0]) {
+            assert!((found - expected).abs() < 1e-12, "{misfits:?}");
+        }
+    }
 }

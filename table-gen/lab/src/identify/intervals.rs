@@ -7,9 +7,10 @@
 //! others are fitted anew, until no fit is good enough. So the intervals hold *together*, and a
 //! parameter that others can stand in for is as wide as they let it be.
 //!
-//! Errors of a record are not independent: readings are rounded, demand wanders. σ² is that of the
-//! residuals, at least that of rounding to 1 mHz, times (1 + ρ)/(1 - ρ) with ρ the correlation of
-//! neighbouring residuals: as if only so many samples were independent.
+//! Errors of a record are not independent: readings are rounded, demand wanders. A run of equal
+//! readings counts as one ([`Data::misfits`]). σ² is that of the residuals, at least that of
+//! rounding to 1 mHz, times (1 + ρ)/(1 - ρ) with ρ the correlation of neighbouring residuals: as if
+//! only so many samples were independent.
 //!
 //! Ends are outward: where the profile crosses the limit between two places, the farther one.
 
@@ -18,7 +19,7 @@ use std::cell::RefCell;
 use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 
 use super::fit::{Data, Seen, fit, half_widths};
-use super::parameters::{COUNT, REST, Told, Values};
+use super::parameters::{COUNT, Told, Values};
 
 /// Probability with which all intervals hold at once, under the assumptions.
 pub const CONFIDENCE: f64 = 0.99;
@@ -30,7 +31,7 @@ const LONGER: f64 = 1.6;
 /// Halvings between the last place that is good enough and the first that is not.
 const HALVINGS: usize = 2;
 /// Times that all is begun again because a better fit was found on the way.
-const RESTARTS: usize = 3;
+const RESTARTS: usize = 6;
 /// A fit that is better by this share of the rise begins all again.
 const BETTER: f64 = 0.02;
 /// Evaluations of a fit for each parameter, for profiles.
@@ -97,7 +98,7 @@ pub fn intervals(
     let mut found = None;
     for _ in 0..RESTARTS {
         let (least, best) = seen.borrow().best;
-        let noise = Noise::of(&data.residuals(&best), free.len());
+        let noise = Noise::of(&data.misfits(&best), free.len());
         let limit = least + noise.rise;
         seen.borrow_mut().with_limit(limit);
         for (sum, values) in fits {
@@ -148,16 +149,9 @@ pub fn intervals(
         });
         let (low, high) = (places[0].min(places[1]), places[0].max(places[1]));
         let (near, far) = ends[index];
-        // Readings of a grid at rest are all rounded alike: half a step that no number of them
-        // takes away.
-        let alike = if index == REST {
-            0.5 * RESOLUTION_MHZ / 1e3
-        } else {
-            0.0
-        };
         Interval {
-            near: range.value(near.map_or(0.0, |place: f64| place.min(low))) - alike,
-            far: range.value(far.map_or(1.0, |place: f64| place.max(high))) + alike,
+            near: range.value(near.map_or(0.0, |place: f64| place.min(low))),
+            far: range.value(far.map_or(1.0, |place: f64| place.max(high))),
             told: match (near, far) {
                 (Some(_), Some(_)) => Told::BothEnds,
                 (None, Some(_)) => Told::AtMost,

@@ -45,7 +45,7 @@ const FIRST_PATIENCE: usize = 3;
 /// See [`FIRST_PATIENCE`].
 const PATIENCE: usize = 12;
 /// Starts that are fitted to the end.
-const FINALISTS: usize = 5;
+const FINALISTS: usize = 8;
 /// Fewest samples of an excerpt beyond the number of parameters.
 const SPARE_SAMPLES: usize = 5;
 
@@ -70,7 +70,9 @@ pub enum IdentifyError {
     #[error(transparent)]
     Excerpt(#[from] ExcerptError),
     /// Too few samples.
-    #[error("{found} samples count; allowed: at least {least} for this many parameters")]
+    #[error(
+        "{found} samples count, equal neighbours as one; allowed: at least {least} for this many parameters"
+    )]
     Samples {
         /// Found.
         found: usize,
@@ -186,17 +188,17 @@ pub fn identify(record: &Record, known: &Known) -> Result<Identified, IdentifyEr
         free.retain(|other| other != index);
         start[*index] = value;
     }
-    let least = free.len() + SPARE_SAMPLES;
-    if excerpt.times_s.len() < least {
-        let found = excerpt.times_s.len();
-        return Err(IdentifyError::Samples { found, least });
-    }
     let data = Data {
         times_s: excerpt.times_s,
         readings_hz: excerpt.deviations_hz,
         stages: known.stages.clone(),
         ranges,
     };
+    let least = free.len() + SPARE_SAMPLES;
+    let found = data.misfits(&start).len();
+    if found < least {
+        return Err(IdentifyError::Samples { found, least });
+    }
     let seen = RefCell::new(Seen::new());
     let mut fits: Vec<(f64, Values)> = search::starts(&data, &start, &free)
         .iter()
@@ -244,7 +246,7 @@ fn answer(
     .map(|(index, off)| {
         let mut without = best;
         without[index] = off;
-        fit::sum_of_squares(&data.residuals(&without)) - least > noise.variance
+        fit::sum_of_squares(&data.misfits(&without)) - least > noise.variance
     });
     let residuals = data.residuals(&best);
     let samples = data.times_s.iter().zip(&data.readings_hz);
