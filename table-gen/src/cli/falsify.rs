@@ -5,6 +5,9 @@ use std::path::PathBuf;
 use super::{Failure, OutputArgs, Overrides, output};
 use lab::falsify;
 
+/// Most runs of one command: a day of two cores.
+const RUNS_MAX: u64 = 1_000_000_000;
+
 /// Arguments of `falsify`.
 #[derive(Debug, clap::Args)]
 pub(super) struct FalsifyArgs {
@@ -21,6 +24,10 @@ pub(super) struct FalsifyArgs {
     /// Control steps (ticks) to simulate
     #[arg(long, value_name = "N", default_value_t = 1_000_000)]
     steps: u64,
+    /// Instead of searching for the worst, draw so many fleets, plants, losses and states from the
+    /// spec's bands and run each once
+    #[arg(long, value_name = "N", conflicts_with = "steps")]
+    runs: Option<u64>,
     /// Seed of the search; the same seed gives the same search
     #[arg(long, value_name = "SEED", default_value_t = 1)]
     seed: u64,
@@ -31,7 +38,16 @@ pub(super) fn run(args: &FalsifyArgs) -> Result<(), Failure> {
     let spec = args.overrides.load(&args.spec)?;
     let bytes = std::fs::read(&args.table)
         .map_err(|error| Failure::BadInput(format!("{}: {error}", args.table.display())))?;
-    let found = falsify::falsify(&bytes, &spec, args.steps, args.seed)
+    let found = match args.runs {
+        Some(runs @ 1..=RUNS_MAX) => falsify::sample(&bytes, &spec, runs, args.seed),
+        Some(runs) => {
+            return Err(Failure::BadInput(format!(
+                "--runs = {runs} is out of range: 1 to {RUNS_MAX}"
+            )));
+        }
+        None => falsify::falsify(&bytes, &spec, args.steps, args.seed),
+    };
+    let found = found
         .map_err(|error| Failure::BadInput(format!("the firmware rejects the table: {error:?}")))?;
     if args.output.json {
         output::json(&found)?;

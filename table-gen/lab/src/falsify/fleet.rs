@@ -41,6 +41,13 @@ const STEPS_MAX: u64 = 4;
 const QUIET_S: f64 = 5.0;
 /// Trajectories that are run side by side; the best of them is the next ones' model.
 const BATCH: u64 = 64;
+/// The same where plants are sampled, and how many are side by side.
+const SAMPLED_MEMBERS: (u64, u64) = (1, 4);
+/// See [`SAMPLED_MEMBERS`].
+const SAMPLED_BATCH: u64 = 512;
+/// Length of a trajectory beyond the last step of its loss, where a spec's time to settle is short
+/// \[s\].
+const BEYOND_S: f64 = 20.0;
 /// Distance past a limit that counts \[Hz\]: far above the arithmetic's error.
 const MARGIN_HZ: f64 = 1e-6;
 
@@ -268,6 +275,43 @@ impl<'a> Fleets<'a> {
         out
     }
 
+    /// Runs so many trajectories, each drawn anew and none near another, or until a claim breaks:
+    /// what a fleet within the spec's bands does, rather than the worst that is found. Crowds are
+    /// small ([`SAMPLED_MEMBERS`]), for what counts here is the number of plants, losses and
+    /// states; a crowd of one is a fleet whose chargers all err alike, the worst case of the
+    /// bounds.
+    pub(super) fn sample(&self, runs: u64, seed: u64) -> Falsification {
+        let mut out = Falsification {
+            steps: 0,
+            trajectories: 0,
+            smallest_margin_hz: f64::INFINITY,
+            violation: None,
+        };
+        let mut random = Random::new(seed);
+        let (least, most) = SAMPLED_MEMBERS;
+        while out.trajectories < runs && out.violation.is_none() {
+            let count = (runs - out.trajectories).min(SAMPLED_BATCH);
+            let draws: Vec<Draw> = (0..count)
+                .map(|_| {
+                    let draw = Draw::new(self.spec, random.number());
+                    let members = (least + random.number() % (most - least + 1)) as usize;
+                    Draw { members, ..draw }
+                })
+                .collect();
+            let outcomes: Vec<Outcome> =
+                draws.par_iter().map(|draw| self.run(draw, false)).collect();
+            for (draw, outcome) in draws.iter().zip(outcomes) {
+                out.steps += outcome.ticks;
+                out.trajectories += 1;
+                out.smallest_margin_hz = out.smallest_margin_hz.min(outcome.margin_hz);
+                if outcome.breach.is_some() && out.violation.is_none() {
+                    out.violation = self.path(draw);
+                }
+            }
+        }
+        out
+    }
+
     /// The path of a trajectory that breaks a claim.
     fn path(&self, draw: &Draw) -> Option<RealPath> {
         let outcome = self.run(draw, true);
@@ -295,7 +339,15 @@ impl<'a> Fleets<'a> {
             crowd.part(rest);
         }
         let mut judge = Judge::new(self.spec);
-        let parts = (TRAJECTORY_S / part_s).round() as usize;
+        let last_s = draw.losses.last().map_or(0.0, |(at_s, _)| *at_s);
+        let length_s = match uncertainty.loss_profile {
+            // As long as it takes to settle, and what may leave again.
+            LossProfile::Constant | LossProfile::NonDecreasing => {
+                TRAJECTORY_S.min(last_s + 2.0 * self.spec.requirements.settle_within_s + BEYOND_S)
+            }
+            LossProfile::Band => TRAJECTORY_S,
+        };
+        let parts = (length_s / part_s).round() as usize;
         let mut frequency = Vec::new();
         let mut ticks = 0;
         let [loss_low, loss_high] = uncertainty.loss_gw;

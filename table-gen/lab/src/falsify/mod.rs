@@ -67,6 +67,33 @@ pub fn falsify(
     Ok(search.run(steps, seed))
 }
 
+/// Draws so many fleets, plants, losses and states from a spec's bands and runs each once, or until
+/// a claim breaks. A table or a spec that knows no fleet is attacked as by [`falsify`], for as many
+/// trajectories as there are runs.
+///
+/// # Errors
+/// A table that the firmware rejects.
+pub fn sample(
+    bytes: &[u8],
+    spec: &Spec,
+    runs: u64,
+    seed: u64,
+) -> Result<Falsification, TableError> {
+    let table = TableView::parse(bytes)?;
+    if knows_a_fleet(spec) || table.response().is_some() {
+        return Ok(fleet::Fleets::new(&table, spec).sample(runs, seed));
+    }
+    let trajectories = Trajectories::new(&table, spec);
+    let length_s = spec.requirements.horizon_s.unwrap_or(TRAJECTORY_S);
+    let ticks = (length_s / trajectories.tick_s()).ceil() as u32;
+    let search = Search {
+        ticks,
+        trajectories,
+    };
+    // A trajectory that breaks nothing has this many steps.
+    Ok(search.run(runs * u64::from(ticks), seed))
+}
+
 /// Whether a spec says more of the fleet than one participation, or more of the plant than its
 /// linear equations.
 fn knows_a_fleet(spec: &Spec) -> bool {
