@@ -3,12 +3,47 @@
 use firmware::table::TableView;
 use serde::Serialize;
 
+use super::event::EventArgs;
 use super::record::RecordArgs;
 use super::{Failure, OutputArgs, output, plot};
+use lab::counterfactual::grids::{self, Grid, Role, Source};
 use lab::counterfactual::{self, Counterfactual, LIMITS, PlantAnswer, Question};
+use lab::identify::Identified;
 
 /// Most draws of the disturbance.
 const DRAWS_MAX: usize = 100_000;
+
+/// The plant on which a recorded event runs again.
+#[derive(Debug, clap::Args)]
+pub(super) struct GridArgs {
+    /// The plant that answers: `identified` from the record (a spec with limited governors is taken
+    /// as it is), or `stated`, the spec's with the response held as a limit
+    #[arg(long, value_name = "WHICH", value_enum, default_value_t = Which::Identified, help_heading = "Recorded event")]
+    plant: Which,
+    #[command(flatten)]
+    event: EventArgs,
+    /// Time after the steepest second up to which the record tells the plant [s]
+    #[arg(long, value_name = "S", default_value_t = grids::UNTIL_S, help_heading = "Recorded event")]
+    until_s: f64,
+}
+
+/// See [`GridArgs`].
+#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+enum Which {
+    Identified,
+    Stated,
+}
+
+impl GridArgs {
+    /// What they ask for.
+    pub(super) fn grid(&self) -> Result<Grid, Failure> {
+        let known = self.event.known(self.until_s)?;
+        Ok(match self.plant {
+            Which::Identified => Grid::Identified(known),
+            Which::Stated => Grid::Stated,
+        })
+    }
+}
 
 /// Arguments of `counterfactual`.
 #[derive(Debug, clap::Args)]
@@ -29,7 +64,9 @@ pub(super) struct CounterfactualArgs {
     /// GW for 2019
     #[arg(long, value_name = "GW", default_value_t = 1.0)]
     relieved_gw: f64,
-    /// Response that the governors held on the day [GW], for the second plant
+    #[command(flatten)]
+    grid: GridArgs,
+    /// Response that the governors held on the day [GW], for `--plant stated`
     #[arg(long, value_name = "GW", default_value_t = 1.0)]
     governor_max_gw: f64,
     /// Draws of the disturbance for the uncertainty
@@ -49,6 +86,10 @@ struct CounterfactualReport<'r> {
     start: &'r str,
     recorded_nadir_hz: f64,
     relay_s: Option<f64>,
+    /// Where the plant of the answer comes from.
+    plant: Source,
+    identified: Option<&'r Identified>,
+    not_identified: Option<&'r str>,
     plants: &'r [PlantAnswer],
     limits: [&'static str; LIMITS.len()],
 }
@@ -74,6 +115,7 @@ impl CounterfactualArgs {
         Ok(Question {
             fleets_gw: self.fleet_gw.clone().into(),
             relieved_gw: self.relieved_gw,
+            grid: self.grid.grid()?,
             governor_max_gw: self.governor_max_gw,
             draws: self.draws,
             seed: self.seed,
@@ -94,6 +136,9 @@ pub(super) fn run(args: &CounterfactualArgs) -> Result<(), Failure> {
         start: &record.start,
         recorded_nadir_hz: found.recorded_nadir_hz,
         relay_s: found.relay_s,
+        plant: found.source,
+        identified: found.identified.as_ref(),
+        not_identified: found.not_identified.as_deref(),
         plants: &found.plants,
         limits: LIMITS,
     };
@@ -126,14 +171,24 @@ fn print(report: &CounterfactualReport<'_>) {
         "record from {}: nadir {:.3} Hz",
         report.start, report.recorded_nadir_hz
     ));
+    if let Some(why) = report.not_identified {
+        output::line(format_args!("the record tells no plant: {why}"));
+    }
     let none = || "-".to_owned();
     for plant in report.plants {
+        let role = match plant.role {
+            Role::Comparison => "to compare with",
+            Role::Answer => "the answer",
+        };
         output::line(format_args!(
-            "\n{}: up to {:.2} GW missing; without chargers the plant follows the record within {:.1} mHz",
+            "\n{} ({role}): up to {:.2} GW missing; without chargers the plant follows the record within {:.1} mHz",
             plant.name,
             plant.largest_missing_gw,
             1000.0 * plant.misfit_hz
         ));
+        if let (Role::Answer, Some(found)) = (plant.role, report.identified) {
+            identified(found);
+        }
         let header = [
             "disturbance",
             "fleet GW",
@@ -141,6 +196,7 @@ fn print(report: &CounterfactualReport<'_>) {
             "nadir Hz",
             "5 %",
             "95 %",
+            "over plants",
         ];
         let mut fleets = output::table(&header);
         let mut levels = output::table(&["disturbance", "above Hz", "fleet GW", "chargers"]);
@@ -155,6 +211,9 @@ fn print(report: &CounterfactualReport<'_>) {
                     format!("{:.3}", fleet.summary.nadir_hz),
                     text(at.map(|at| at.p05)),
                     text(at.map(|at| at.p95)),
+                    fleet
+                        .nadir_over_plants_hz
+                        .map_or_else(none, |[low, high]| format!("{low:.3} to {high:.3}")),
                 ]);
             }
             for level in &variant.levels {
@@ -172,4 +231,23 @@ fn print(report: &CounterfactualReport<'_>) {
         output::line(fleets);
         output::line(levels);
     }
+}
+
+/// The plant that the record tells, on one line.
+fn identified(found: &Identified) {
+    let told: Vec<String> = found
+        .parameters
+        .iter()
+        .filter(|it| it.low < it.high)
+        .map(|it| {
+            let key = it.key.rsplit('.').next().unwrap_or(it.key);
+            format!("{key} {:.3} [{:.3}, {:.3}]", it.value, it.low, it.high)
+        })
+        .collect();
+    output::line(format_args!(
+        "identified from {} samples, which the best plant leaves by {:.1} mHz: {}",
+        found.samples,
+        1e3 * found.residual_hz,
+        told.join("; ")
+    ));
 }

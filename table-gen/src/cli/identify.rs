@@ -4,17 +4,14 @@ use std::path::PathBuf;
 
 use serde::Serialize;
 
+use super::event::EventArgs;
 use super::files::write_one;
 use super::record::RecordOptions;
 use super::{Failure, OutputArgs, Overrides, output};
-use lab::identify::course::Stage;
 use lab::identify::forecast::{Event, Forecast, forecast};
-use lab::identify::parameters::{
-    COUNT, GOVERNOR_TIME, LAG_TIME, LEAD_TIME, PARAMETERS, TURBINE_TIME, Told,
-};
+use lab::identify::parameters::{GOVERNOR_TIME, LAG_TIME, LEAD_TIME, TURBINE_TIME, Told};
 use lab::identify::{self, Identified, Known, figure, spec_file};
 use lab::report::chart;
-use lab::simulation::beyond::file::ScenarioFile;
 use model::spec::Spec;
 
 /// Arguments of `identify`.
@@ -33,18 +30,11 @@ pub(super) struct IdentifyArgs {
     output: OutputArgs,
     #[command(flatten)]
     options: RecordOptions,
-    /// What was lost, at once [GW]
-    #[arg(long, value_name = "GW")]
-    loss_gw: Option<f64>,
-    /// What was lost, in stages: a shipped scenario such as gb-2019, or a TOML file of [[loss]]
-    #[arg(long, value_name = "FILE", conflicts_with = "loss_gw")]
-    loss_steps: Option<String>,
+    #[command(flatten)]
+    event: EventArgs,
     /// Look for the time constants although a spec is named
     #[arg(long)]
     free_times: bool,
-    /// A parameter that is known, e.g. plant.inertia_gw_s_per_hz=4.2; repeatable
-    #[arg(long, value_name = "KEY=VALUE")]
-    given: Vec<String>,
     /// Time after the steepest second up to which the record counts [s]
     #[arg(long, value_name = "S", default_value_t = identify::UNTIL_S)]
     until_s: f64,
@@ -116,43 +106,7 @@ pub(super) fn run(args: &IdentifyArgs) -> Result<(), Failure> {
 
 /// What the options know of the event.
 fn known(args: &IdentifyArgs, base: &Spec) -> Result<Known, Failure> {
-    let within = |option: &str, value: f64, low: f64, high: f64| {
-        if value >= low && value <= high {
-            Ok(())
-        } else {
-            Err(Failure::BadInput(format!(
-                "{option} = {value} is out of range: {low} to {high}"
-            )))
-        }
-    };
-    within("--until-s", args.until_s, 2.0, 600.0)?;
-    let mut stages = Vec::new();
-    if let Some(power_gw) = args.loss_gw {
-        within("--loss-gw", power_gw, 0.001, 100.0)?;
-        stages.push(Stage {
-            after_s: 0.0,
-            power_gw,
-            inertia_gw_s_per_hz: 0.0,
-        });
-    }
-    if let Some(name) = &args.loss_steps {
-        let file = ScenarioFile::load(name).map_err(Failure::bad)?;
-        stages.extend(file.losses().iter().map(|loss| Stage {
-            after_s: loss.at_s,
-            power_gw: loss.power_gw,
-            inertia_gw_s_per_hz: loss.inertia_gw_s_per_hz,
-        }));
-        if stages.is_empty() {
-            return Err(Failure::BadInput(format!(
-                "{name}: no [[loss]]; allowed: at least one"
-            )));
-        }
-    }
-    let mut given = args
-        .given
-        .iter()
-        .map(|text| given(text))
-        .collect::<Result<Vec<_>, _>>()?;
+    let mut known = args.event.known(args.until_s)?;
     if args.spec.is_some() && !args.free_times {
         let plant = &base.plant;
         let times = [
@@ -162,33 +116,14 @@ fn known(args: &IdentifyArgs, base: &Spec) -> Result<Known, Failure> {
             (LAG_TIME, plant.lag_time_s),
         ];
         // What is given by name stands above the spec.
-        let named: Vec<usize> = given.iter().map(|(index, _)| *index).collect();
-        given.extend(
+        let named: Vec<usize> = known.given.iter().map(|(index, _)| *index).collect();
+        known.given.extend(
             times
                 .into_iter()
                 .filter(|(index, _)| !named.contains(index)),
         );
     }
-    Ok(Known {
-        stages,
-        given,
-        until_s: args.until_s,
-    })
-}
-
-/// A parameter that is known.
-fn given(text: &str) -> Result<(usize, f64), Failure> {
-    let keys = || PARAMETERS.map(|parameter| parameter.key).join(", ");
-    let refuse = || {
-        let keys = keys();
-        Failure::BadInput(format!(
-            "--given {text}: allowed: KEY=NUMBER with KEY one of {keys}"
-        ))
-    };
-    let (key, value) = text.split_once('=').ok_or_else(refuse)?;
-    let index = (0..COUNT).find(|index| PARAMETERS[*index].key == key);
-    let value: f64 = value.trim().parse().map_err(|_| refuse())?;
-    Ok((index.ok_or_else(refuse)?, value))
+    Ok(known)
 }
 
 /// Events to forecast; their rest is still absolute.

@@ -13,6 +13,7 @@ mod compare;
 mod counterfactual;
 #[cfg(test)]
 mod documented;
+mod event;
 mod failure;
 mod falsify;
 mod files;

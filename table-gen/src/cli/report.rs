@@ -6,6 +6,7 @@ use firmware::table::TableView;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 
+use super::counterfactual::GridArgs;
 use super::files::write_all;
 use super::record::RecordOptions;
 use super::{Failure, OutputArgs, SpecArgs, compare, output, progress};
@@ -49,6 +50,8 @@ pub(super) struct ReportArgs {
     trace: Option<PathBuf>,
     #[command(flatten)]
     record: RecordOptions,
+    #[command(flatten)]
+    grid: GridArgs,
     /// Instances of the firmware in the section of the fleet
     #[arg(long, value_name = "N", default_value_t = FLEET_CHARGERS)]
     fleet: usize,
@@ -114,7 +117,7 @@ pub(super) fn run(args: &ReportArgs) -> Result<(), Failure> {
         findings.scorecard = Some((config, found));
         findings.fleet = Some(fleet_of(&study.spec, &table, args.fleet)?);
         if let Some(record) = &record {
-            more.extend(recorded(study, record)?);
+            more.extend(recorded(study, record, &args.grid)?);
         }
     }
     let rendered = report::render_studies(&studies, &findings, more).map_err(Failure::bad)?;
@@ -178,11 +181,14 @@ pub(super) fn fleet_of(
 }
 
 /// The sections of a recorded event.
-fn recorded(study: &Study, record: &Record) -> Result<Vec<Section>, Failure> {
+fn recorded(study: &Study, record: &Record, grid: &GridArgs) -> Result<Vec<Section>, Failure> {
     let table = view(&study.table)?;
     let replay = replay::replay(&table, record)
         .map_err(|error| Failure::BadInput(format!("the charger rejects the table: {error:?}")))?;
-    let question = Question::PAPER;
+    let question = Question {
+        grid: grid.grid()?,
+        ..Question::PAPER
+    };
     let found = counterfactual::answer(&study.spec, &table, record, &question);
     let found = found.map_err(Failure::bad)?;
     let name = study.spec.name.as_str();

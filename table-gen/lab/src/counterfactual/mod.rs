@@ -3,12 +3,11 @@
 //!
 //! The power that was missing is inferred from the record through the plant ([`smoother`]), and the
 //! plant runs once more with it, now with the firmware in the loop, which sees the frequency alone
-//! ([`rerun`]). The answer inherits the plant, so it is given for two: the spec's, whose governors
-//! answer without limit, and one whose governors stop at the response that was held on the day.
-//! Where the spec's own governors are limited, as `identify` writes them, they take the place of
-//! the second, and the first is the same plant without their limits. [`LIMITS`] says what neither
-//! knows.
+//! ([`rerun`]). The answer inherits the plant, so it is given for two ([`grids`]): the one that the
+//! record itself tells, and the spec's with linear governors to compare with. [`LIMITS`] says what
+//! neither knows.
 
+pub mod grids;
 pub mod rerun;
 pub mod smoother;
 
@@ -20,14 +19,14 @@ use rand_pcg::Pcg64;
 use rayon::prelude::*;
 use serde::Serialize;
 
+use crate::identify::{Identified, Known};
 use crate::record::Record;
 use crate::simulation::NOMINAL_HZ;
-use crate::simulation::beyond::Governor;
 use crate::simulation::closed_loop::LoopError;
 use crate::simulation::monitor::Summary;
 use crate::simulation::monte_carlo::statistics::Quantiles;
 use crate::simulation::recorder::History;
-use model::plant::Plant;
+use grids::{Candidate, Grid, Role, Source};
 use model::spec::Spec;
 use rerun::Rerun;
 use smoother::{Disturbance, Smoother};
@@ -43,9 +42,10 @@ const FLEET_STEP_GW: f64 = 0.05;
 const FLEET_MAX_GW: f64 = 5.0;
 
 /// What the answer does not know.
-pub const LIMITS: [&str; 6] = [
+pub const LIMITS: [&str; 7] = [
     "The missing power is what the plant needs to explain the record: it holds every response that the plant does not model, and every error of the plant's parameters.",
     "Governors without limits answer in proportion: they explain a fall to 48.8 Hz by far more missing power than was lost, and take back what the chargers give. Limited governors stop at the response stated or identified; with them the inferred loss can be compared with the reported one.",
+    "A record does not tell one plant: many explain it as well as the best, and the nadir is given over some of them. How large all powers are rests on the loss that is stated, or else on the spec's inertia; and no plant here knows what else answered on the day.",
     "The record has one sample a second: a loss within a second is smeared over it, and the first second's slope is uncertain.",
     "Demand that relays disconnected at 48.8 Hz is in the record as power that came back. Where the chargers keep the frequency higher this would not have happened: one variant takes it out, by the amount stated, from the sample at which the record passes 48.8 Hz.",
     "Embedded generation that tripped because the frequency fell so low is in the record as missing power; with the chargers some of it would have stayed. This makes the answer pessimistic by an amount that is not known here.",
@@ -83,7 +83,9 @@ pub struct Question {
     pub fleets_gw: Cow<'static, [f64]>,
     /// Demand that relays disconnected at [`RELAY_HZ`] \[GW\].
     pub relieved_gw: f64,
-    /// Response that the governors held on the day \[GW\], for the second plant.
+    /// The grid on which the event runs again.
+    pub grid: Grid,
+    /// Response that the governors held on the day \[GW\], for the second of the stated plants.
     pub governor_max_gw: f64,
     /// Draws from the posterior of the disturbance.
     pub draws: usize,
@@ -97,6 +99,11 @@ impl Question {
     pub const PAPER: Self = Self {
         fleets_gw: Cow::Borrowed(&[0.7, 1.4]),
         relieved_gw: 1.0,
+        grid: Grid::Identified(Known {
+            stages: Vec::new(),
+            given: Vec::new(),
+            until_s: grids::UNTIL_S,
+        }),
         governor_max_gw: 1.0,
         draws: 50,
         seed: 0,
@@ -114,6 +121,10 @@ pub struct FleetAnswer {
     pub summary: Summary,
     /// Nadir over draws of the disturbance \[Hz\].
     pub nadir_hz: Quantiles,
+    /// Least and greatest nadir over plants that explain the record \[Hz\]; none where the plant is
+    /// not identified.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub nadir_over_plants_hz: Option<[f64; 2]>,
 }
 
 /// Chargers that keep the frequency above a level.
@@ -149,6 +160,8 @@ pub type Curve = Vec<(f64, f64, f64)>;
 pub struct PlantAnswer {
     /// Which plant.
     pub name: &'static str,
+    /// What it is for.
+    pub role: Role,
     /// Standard deviation of the fitted walk \[GW in a step\].
     pub walk_gw: f64,
     /// Standard deviation of the fitted readings \[Hz\].
@@ -176,7 +189,13 @@ pub struct Counterfactual {
     pub recorded_nadir_hz: f64,
     /// When the record first passes 48.8 Hz \[s\].
     pub relay_s: Option<f64>,
-    /// On each plant.
+    /// Where the plant of the answer comes from.
+    pub source: Source,
+    /// What the record tells of the plant, where it was asked.
+    pub identified: Option<Identified>,
+    /// Why it was asked and did not tell.
+    pub not_identified: Option<String>,
+    /// On each plant: the comparison, then the answer.
     pub plants: Vec<PlantAnswer>,
 }
 
@@ -207,49 +226,36 @@ pub fn answer(
         .map(|sample| (sample.time_s, sample.frequency_hz))
         .collect();
     let relay = recorded.iter().position(|(_, f)| *f <= RELAY_HZ);
-    let limited = Governor {
-        output_gw: [f64::NEG_INFINITY, question.governor_max_gw],
-        ..Governor::LINEAR
-    };
-    let own = Governor::of(spec);
-    // The plant that counts comes last; the other is there to compare with.
-    let plants = if own.is_linear() {
-        [("spec's governors", own), ("limited governors", limited)]
-    } else {
-        [
-            ("linear governors", Governor::LINEAR),
-            ("spec's governors", own),
-        ]
-    }
-    .into_iter()
-    .map(|(name, governor)| {
-        let rerun = Rerun {
-            spec,
-            table,
-            governor,
-            step_s,
-        };
-        on_plant(
-            name,
-            &rerun,
-            &recorded,
-            relay,
-            ticks.round() as usize,
-            question,
-        )
-    })
-    .collect::<Result<Vec<_>, LoopError>>()?;
+    let grids = grids::of(spec, record, &question.grid, question.governor_max_gw);
+    let plants = grids
+        .candidates
+        .iter()
+        .map(|candidate| {
+            let rerun = Rerun {
+                spec,
+                table,
+                plant: candidate.plant,
+                governor: candidate.governor,
+                step_s,
+            };
+            let ticks = ticks.round() as usize;
+            on_plant(candidate, &rerun, &recorded, relay, ticks, question)
+        })
+        .collect::<Result<Vec<_>, LoopError>>()?;
     Ok(Counterfactual {
         recorded_nadir_hz: recorded.iter().map(|p| p.1).fold(f64::INFINITY, f64::min),
         relay_s: relay.map(|index| recorded[index].0),
         recorded,
+        source: grids.source,
+        identified: grids.identified,
+        not_identified: grids.not_identified,
         plants,
     })
 }
 
 /// The answers on one plant.
 fn on_plant(
-    name: &'static str,
+    candidate: &Candidate,
     rerun: &Rerun<'_>,
     recorded: &[(f64, f64)],
     relay: Option<usize>,
@@ -257,8 +263,7 @@ fn on_plant(
     question: &Question,
 ) -> Result<PlantAnswer, LoopError> {
     let deviations: Vec<f64> = recorded.iter().map(|(_, f)| f - NOMINAL_HZ).collect();
-    let plant = Plant::new(rerun.spec);
-    let smoother = Smoother::fit(&plant, rerun.governor, &deviations, rerun.step_s);
+    let smoother = Smoother::fit(&rerun.plant, rerun.governor, &deviations, rerun.step_s);
     let known = smoother.smooth(&deviations);
     let mut history = History::default();
     rerun.run(0.0, &known, 0.0, None, &mut history)?;
@@ -270,6 +275,21 @@ fn on_plant(
     let mut random = Pcg64::seed_from_u64(question.seed);
     let draws: Vec<Disturbance> = (0..question.draws)
         .map(|_| smoother.draw(&known, &mut random))
+        .collect();
+    // Other plants that explain the record, each with what was missing on it.
+    let others: Vec<(Rerun<'_>, Disturbance)> = candidate
+        .others
+        .par_iter()
+        .map(|(plant, governor)| {
+            let (plant, governor) = (*plant, *governor);
+            let smoother = Smoother::fit(&plant, governor, &deviations, rerun.step_s);
+            let other = Rerun {
+                plant,
+                governor,
+                ..*rerun
+            };
+            (other, smoother.smooth(&deviations))
+        })
         .collect();
     let reliefs = [
         ("relays' relief as recorded", 0.0),
@@ -289,10 +309,23 @@ fn on_plant(
                     .par_iter()
                     .map(nadir)
                     .collect::<Result<Vec<f64>, LoopError>>()?;
+                let summary = rerun.run(*fleet_gw, &known, put_back_gw, relay, &mut ())?;
+                let over = others
+                    .par_iter()
+                    .map(|(other, known)| {
+                        let run = other.run(*fleet_gw, known, put_back_gw, relay, &mut ())?;
+                        Ok(run.nadir_hz)
+                    })
+                    .collect::<Result<Vec<f64>, LoopError>>()?;
+                let own = [summary.nadir_hz; 2];
+                let range = over.iter().fold(own, |[low, high], nadir| {
+                    [low.min(*nadir), high.max(*nadir)]
+                });
                 Ok(FleetAnswer {
                     fleet_gw: *fleet_gw,
                     chargers: chargers(rerun.spec, *fleet_gw),
-                    summary: rerun.run(*fleet_gw, &known, put_back_gw, relay, &mut ())?,
+                    summary,
+                    nadir_over_plants_hz: (!over.is_empty()).then_some(range),
                     nadir_hz: Quantiles::of(nadirs.into_iter().map(Some)),
                 })
             })
@@ -314,7 +347,8 @@ fn on_plant(
         curves.push((*fleet_gw, history.samples.iter().map(point).collect()));
     }
     Ok(PlantAnswer {
-        name,
+        name: candidate.name,
+        role: candidate.role,
         walk_gw: smoother.walk_gw,
         reading_hz: smoother.reading_hz,
         misfit_hz,

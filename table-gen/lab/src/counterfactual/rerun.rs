@@ -20,6 +20,8 @@ pub struct Rerun<'a> {
     pub spec: &'a Spec,
     /// The firmware's table.
     pub table: &'a TableView<'a>,
+    /// The plant; the fleet's power is replaced.
+    pub plant: Plant,
     /// Limits of the governors.
     pub governor: Governor,
     /// Time from one value of the disturbance to the next \[s\].
@@ -71,7 +73,11 @@ impl Rerun<'_> {
             initial: disturbance.initial,
             ..Scenario::of(&spec)
         };
-        let plant = BeyondPlant::new(Plant::new(&spec), &disturbances, 0.0, 0);
+        let plant = Plant {
+            fleet: fleet_gw,
+            ..self.plant
+        };
+        let plant = BeyondPlant::new(plant, &disturbances, 0.0, 0);
         let (_, parts) = closed_loop.parts(&scenario);
         let mut grid = BeyondSystem::new(plant, parts, disturbance.initial);
         Ok(closed_loop.run_on(&mut grid, &scenario, recorder))

@@ -4,6 +4,7 @@
 use super::figure::{Axis, Curve, Figure, Stretch, thin};
 use super::palette::Colour;
 use super::section::{DataTable, Section};
+use crate::counterfactual::grids::Role;
 use crate::counterfactual::{Counterfactual, LIMITS, PlantAnswer};
 use crate::record::Record;
 use crate::replay::{REACTION_STEP_MAX_S, Replay};
@@ -112,9 +113,18 @@ pub fn counterfactual(spec: &str, found: &Counterfactual) -> Section {
          the firmware, which sees the frequency alone.",
         found.recorded_nadir_hz
     ));
+    if let Some(why) = &found.not_identified {
+        section
+            .words
+            .push(format!("The record tells no plant: {why}."));
+    }
     for plant in &found.plants {
+        let role = match plant.role {
+            Role::Comparison => "to compare with",
+            Role::Answer => "the answer",
+        };
         section.words.push(format!(
-            "{}: up to {:.2} GW are missing; without chargers the plant follows the record within {:.1} mHz.",
+            "{} ({role}): up to {:.2} GW are missing; without chargers the plant follows the record within {:.1} mHz.",
             plant.name,
             plant.largest_missing_gw,
             1000.0 * plant.misfit_hz
@@ -136,6 +146,7 @@ fn answers(plant: &PlantAnswer) -> [DataTable; 2] {
         "Nadir [Hz]",
         "5 % [Hz]",
         "95 % [Hz]",
+        "Over plants [Hz]",
     ];
     let mut fleets = DataTable::new(format!("counterfactual: {}, by fleet", plant.name), &header);
     let header = ["Disturbance", "Above [Hz]", "Fleet [GW]", "Chargers"];
@@ -151,6 +162,9 @@ fn answers(plant: &PlantAnswer) -> [DataTable; 2] {
                 format!("{:.3}", fleet.summary.nadir_hz),
                 at.map_or_else(none, |at| format!("{:.3}", at.p05)),
                 at.map_or_else(none, |at| format!("{:.3}", at.p95)),
+                fleet
+                    .nadir_over_plants_hz
+                    .map_or_else(none, |[low, high]| format!("{low:.3} to {high:.3}")),
             ]);
         }
         for level in &variant.levels {
