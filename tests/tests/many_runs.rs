@@ -214,17 +214,20 @@ fn a_fleet_that_failed_is_no_fleet() {
     assert_eq!(run.measures.changes_max, 0);
 }
 
-const FEW_DRAWS: Question = Question {
-    draws: 4,
-    grid: Grid::Stated,
-    ..Question::PAPER
-};
+/// The stated plants, few draws.
+fn few_draws() -> Question {
+    Question {
+        draws: 4,
+        grid: Grid::Stated,
+        ..Question::PAPER
+    }
+}
 
 #[test]
 fn the_record_of_2019_is_explained_and_answered() {
     let (spec, bytes) = paper("paper-bi");
     let table = TableView::parse(bytes).unwrap();
-    let found = answer(spec, &table, &recorded_2019(), &FEW_DRAWS).unwrap();
+    let found = answer(spec, &table, &recorded_2019(), &few_draws()).unwrap();
     assert_eq!(found.recorded_nadir_hz, 49.083);
     assert_eq!(found.relay_s, None);
     for plant in &found.plants {
@@ -250,7 +253,7 @@ fn the_record_of_2019_is_explained_and_answered() {
     let f_mean_hz = mean(&(first..last).map(f_hz).collect::<Vec<_>>());
     let slope_hz_per_s = (f_hz(last) - f_hz(first)) / 20.0;
     let plant = Plant::new(spec);
-    let expected_gw = FEW_DRAWS.governor_max_gw
+    let expected_gw = few_draws().governor_max_gw
         - plant.damping * f_mean_hz
         - 2.0 * plant.inertia * slope_hz_per_s;
     let missing_gw = mean(&found.plants[1].disturbance.missing_gw[first..last]);
@@ -316,7 +319,7 @@ fn what_relays_disconnected_is_put_back() {
             frequency_hz: if k < 16 { down_hz } else { up_hz },
         });
     }
-    let found = answer(spec, &table, &record, &FEW_DRAWS).unwrap();
+    let found = answer(spec, &table, &record, &few_draws()).unwrap();
     assert_eq!(found.recorded_nadir_hz, 48.787);
     // 49.121 Hz less 0.0209 Hz a second is at most 48.8 for the first time after 16 s.
     assert_eq!(found.relay_s, Some(last.time_s + 16.0 * step_s));
