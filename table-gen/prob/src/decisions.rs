@@ -161,31 +161,36 @@ impl Regions {
         state: PhaseState,
         ball: &Ball,
     ) -> Vec<(PhaseState, Decision)> {
+        let mut out: Vec<(PhaseState, Decision)> = Vec::new();
+        self.each_region(ball, &mut |measured| {
+            let outcome = state.step(table, measured);
+            if !out.contains(&outcome) {
+                out.push(outcome);
+            }
+        });
+        out
+    }
+
+    /// One state of each region that the set may meet.
+    pub(crate) fn each_region(&self, ball: &Ball, told: &mut dyn FnMut(State)) {
         let slices: [Vec<Slice>; STATES] = std::array::from_fn(|axis| self.slices(axis, ball));
         let bounds: Vec<Interval> = self
             .probes
             .iter()
             .map(|probe| along(&probe.inner, &probe.lengths, ball))
             .collect();
-        let mut out: Vec<(PhaseState, Decision)> = Vec::new();
         for f in &slices[0] {
             for g in &slices[1] {
                 for l in &slices[2] {
                     for p in &slices[3] {
                         let region = [f, g, l, p];
-                        if !self.may_meet(&region, &bounds) {
-                            continue;
-                        }
-                        let measured = State(region.map(|slice| slice.representative));
-                        let outcome = state.step(table, measured);
-                        if !out.contains(&outcome) {
-                            out.push(outcome);
+                        if self.may_meet(&region, &bounds) {
+                            told(State(region.map(|slice| slice.representative)));
                         }
                     }
                 }
             }
         }
-        out
     }
 
     /// Whether the bounds along every direction meet those of the region.

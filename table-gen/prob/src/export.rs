@@ -11,6 +11,14 @@
 //! 1 - Pmax=? [F<=2n+1 "failed"]
 //! ```
 //!
+//! With the seconds that each state may bring, the upper bound of the expected ones is
+//!
+//! ```text
+//! Rmax=? [C<=2n+1]
+//! ```
+//!
+//! where no more than the horizon is ever brought: ours is cut there, and this is not.
+//!
 //! | numbers there | what |
 //! |---|---|
 //! | 0 | the start |
@@ -20,6 +28,7 @@
 use std::io::{self, Write};
 
 use crate::chain::{Chain, FAILED, SAFE};
+use crate::reward::Reward;
 
 /// Steps of the exported process that belong to steps of the chain.
 pub const fn steps_there(steps: u32) -> u32 {
@@ -73,14 +82,34 @@ fn chance(chain: &Chain, state: u32, first_set: usize) -> Action {
     outcomes
 }
 
-/// Writes the DRN file. `note` is put on top as a comment; it has no line breaks.
+/// Writes the DRN file. `note` is put on top as a comment; it has no line breaks. With a reward
+/// there is a reward model `seconds`: what a state brings in its step, and what failing in it
+/// counts as, times what its branches leave to that. The failed state brings nothing more.
 ///
 /// # Errors
 /// What writing gives.
-pub fn drn(chain: &Chain, note: &str, out: &mut impl Write) -> io::Result<()> {
+pub fn drn(
+    chain: &Chain,
+    reward: Option<&Reward>,
+    note: &str,
+    out: &mut impl Write,
+) -> io::Result<()> {
     let (states, choices) = sizes(chain);
+    let seconds = |state: usize| -> String {
+        let Some(reward) = reward else {
+            return String::new();
+        };
+        // The start is the first state there.
+        let of_chain = state.checked_sub(1).filter(|own| *own < chain.states());
+        let brings = of_chain.map_or(0.0, |own| {
+            let failing = failing(chain, own as u32);
+            reward.seconds[own] + failing * reward.failed_s
+        });
+        format!(" [{brings:?}]")
+    };
+    let name = reward.map_or("", |_| "seconds");
     writeln!(out, "// {note}")?;
-    writeln!(out, "@type: MDP\n@parameters\n\n@reward_models\n")?;
+    writeln!(out, "@type: MDP\n@parameters\n\n@reward_models\n{name}")?;
     writeln!(out, "@nr_states\n{states}\n@nr_choices\n{choices}\n@model")?;
     for (state, actions) in actions(chain).enumerate() {
         let label = match state {
@@ -89,7 +118,7 @@ pub fn drn(chain: &Chain, note: &str, out: &mut impl Write) -> io::Result<()> {
             2 => " safe",
             _ => "",
         };
-        writeln!(out, "state {state}{label}")?;
+        writeln!(out, "state {state}{}{label}", seconds(state))?;
         for (index, outcomes) in actions.iter().enumerate() {
             writeln!(out, "\taction {index}")?;
             let mut outcomes = outcomes.clone();
@@ -124,6 +153,21 @@ pub fn prism(chain: &Chain, tra: &mut impl Write, lab: &mut impl Write) -> io::R
     writeln!(lab, "0: 0\n1: 2\n2: 3")
 }
 
+/// The probability that a state fails in its step: what is left over, and branches that have failed
+/// for certain.
+fn failing(chain: &Chain, state: u32) -> f64 {
+    if state == FAILED || state == SAFE {
+        return 0.0;
+    }
+    let certain = |set: u32| chain.members(set) == [FAILED];
+    let goes_on = chain.branches(state).iter();
+    let goes_on: f64 = goes_on
+        .filter(|branch| !certain(branch.set))
+        .map(|branch| branch.probability)
+        .sum();
+    (1.0 - goes_on).max(0.0)
+}
+
 /// States and choices.
 fn sizes(chain: &Chain) -> (usize, usize) {
     let states = 1 + chain.states() + chain.sets();
@@ -147,7 +191,7 @@ mod tests {
     #[test]
     fn a_small_chain_in_drn() {
         let mut out = Vec::new();
-        drn(&small(), "small", &mut out).unwrap();
+        drn(&small(), None, "small", &mut out).unwrap();
         let expected = "// small\n@type: MDP\n@parameters\n\n@reward_models\n\n@nr_states\n6\n@nr_choices\n7\n@model\n\
             state 0 init\n\taction 0\n\t\t3 : 1.0\n\
             state 1 failed\n\taction 0\n\t\t1 : 1.0\n\
@@ -156,6 +200,21 @@ mod tests {
             state 4\n\taction 0\n\t\t2 : 1.0\n\taction 1\n\t\t3 : 1.0\n\
             state 5\n\taction 0\n\t\t2 : 1.0\n";
         assert_eq!(String::from_utf8(out).unwrap(), expected);
+    }
+
+    #[test]
+    fn the_seconds_of_a_small_chain() {
+        let reward = Reward {
+            seconds: vec![0.0, 0.0, 2.0],
+            failed_s: 8.0,
+        };
+        let mut out = Vec::new();
+        drn(&small(), Some(&reward), "small", &mut out).unwrap();
+        let text = String::from_utf8(out).unwrap();
+        // A quarter is left over: 2 + 8/4.
+        assert!(text.contains("@reward_models\nseconds\n@nr_states"));
+        assert!(text.contains("state 0 [0.0] init\n") && text.contains("state 1 [0.0] failed\n"));
+        assert!(text.contains("state 3 [4.0]\n") && text.contains("state 4 [0.0]\n"));
     }
 
     #[test]

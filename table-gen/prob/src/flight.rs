@@ -170,6 +170,18 @@ impl Flights {
         (lowest - (self.moving_f * net.moving).next_up()).next_down()
     }
 
+    /// In how many of the first so many ticks f may be below a limit \[Hz\].
+    pub(crate) fn ticks_below(&self, ball: &Ball, net: NetPower, ticks: u32, limit: f64) -> u32 {
+        let moving = (self.moving_f * net.moving).next_up();
+        let may = |tick: &&Tick| {
+            tick.steps.iter().any(|step| {
+                let f = along(&step.row, &step.lengths, ball) + step.gamma * net.range;
+                (f.low - moving).next_down() < limit
+            })
+        };
+        self.ticks[..ticks as usize].iter().filter(may).count() as u32
+    }
+
     /// Contraction of each block over so many ticks, and what half a unit of drive adds.
     pub(crate) fn of_block(&self, block: usize, ticks: u32) -> (f64, f64, f64) {
         let span = &self.spans[ticks as usize];

@@ -16,6 +16,9 @@
 //! |---|---|
 //! | the chain | `chain` |
 //! | its value over a horizon, rounded down | `value` |
+//! | expected seconds below a limit, rounded up | `reward` |
+//! | a chain in which a controller chooses too | `choices` |
+//! | the same for processes with additive noise, on cells | `grid` |
 //! | DRN and PRISM's explicit files, for an outside model checker | `export` |
 //!
 //! It is built for a table of laws by games in these steps:
@@ -27,6 +30,7 @@
 //! | overlapping cells whose sets are closed under a step | `cover` |
 //! | the firmware's decisions on a set | `decisions` |
 //! | nodes and branches, from the event on | `closed_loop` |
+//! | other levels for a table, chosen on these sets | `maximise` |
 //! | single runs of the same process, beside the bound | `sampled` |
 //!
 //! `analysis` puts the layers together.
@@ -37,15 +41,19 @@
 pub mod analysis;
 pub mod bands;
 pub mod chain;
+pub mod choices;
 pub mod closed_loop;
 mod cover;
 mod decisions;
 pub mod export;
 mod flight;
+pub mod grid;
 pub mod loss;
+pub mod maximise;
 mod modes;
 pub mod normal;
 pub mod participation;
+pub mod reward;
 pub mod sampled;
 pub mod union;
 pub mod value;

@@ -72,6 +72,7 @@ fn agrees_with_storm() {
         let path = dir.join(format!("{name}.drn"));
         export::drn(
             chain,
+            None,
             name,
             &mut BufWriter::new(File::create(&path).unwrap()),
         )

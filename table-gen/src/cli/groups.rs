@@ -20,6 +20,7 @@ const GROUPS: [(&str, &[&str]); 5] = [
         "Research",
         &[
             "synth",
+            "maximise",
             "falsify",
             "counterfactual",
             "formula",

@@ -24,6 +24,7 @@ mod identify;
 mod inspect;
 mod keygen;
 mod keys;
+mod maximise;
 mod monitor;
 mod monte_carlo;
 mod ocpp;
@@ -98,6 +99,8 @@ enum Command {
     Verify(verify::VerifyArgs),
     /// How likely a table keeps its promise: a rigorous lower bound
     Prob(prob::ProbArgs),
+    /// Change a table's levels where that makes its bound by `prob` larger
+    Maximise(maximise::MaximiseArgs),
     /// Search for a real trajectory that breaks a table
     Falsify(falsify::FalsifyArgs),
     /// A requirement in temporal logic: as games of a spec, or as a monitor of a recorded frequency
@@ -149,6 +152,7 @@ pub(crate) fn run() -> ExitCode {
         Command::Replay(args) => replay::run(&args),
         Command::Verify(args) => verify::run(&args),
         Command::Prob(args) => prob::run(&args),
+        Command::Maximise(args) => maximise::run(&args),
         Command::Falsify(args) => falsify::run(&args),
         Command::Formula(args) => formula::run(&args),
         Command::Monitor(args) => monitor::run(&args),

@@ -10,6 +10,7 @@ use ::prob::participation::Participation;
 use ::prob::sampled::{RUNS_MAX, Runs, Sampled};
 use firmware::table::TableView;
 use lab::report::chart;
+use lab::report::section::Section;
 use serde::Serialize;
 use verify::VerifyError;
 
@@ -19,7 +20,12 @@ use super::{Failure, Overrides, output, prob_figure, progress};
 use model::spec::Spec;
 
 /// Time over which the promise is bounded where the spec has no horizon \[s\].
-const HORIZON_S: f64 = 120.0;
+pub(super) const HORIZON_S: f64 = 120.0;
+
+/// Width of a bin of the fleet's power [GW].
+pub(super) const BIN_GW: f64 = 0.0025;
+/// Nodes after which a chain is followed no more.
+pub(super) const NODES_MAX: usize = 500_000;
 
 /// Arguments of `prob`.
 #[derive(Debug, clap::Args)]
@@ -58,10 +64,10 @@ pub(super) struct ProbArgs {
     #[arg(long, value_name = "S")]
     horizon_s: Option<f64>,
     /// Width of a bin of the fleet's power [GW]
-    #[arg(long, value_name = "GW", default_value_t = 0.0025)]
+    #[arg(long, value_name = "GW", default_value_t = BIN_GW)]
     bin_gw: f64,
     /// Nodes after which a chain is followed no more; what is not followed counts as failed
-    #[arg(long, value_name = "N", default_value_t = 500_000)]
+    #[arg(long, value_name = "N", default_value_t = NODES_MAX)]
     nodes_max: usize,
     /// Write the chain in Storm's format (laws by games, with a participation; exact is one)
     #[arg(long, value_name = "FILE")]
@@ -181,6 +187,41 @@ fn question(args: &ProbArgs, spec: &Spec) -> Result<Question, Failure> {
     })
 }
 
+/// The section of a report about a spec that says how its participation is drawn; nothing for
+/// others. The band of losses is examined for these errors beside the spec's.
+pub(super) fn section(
+    spec: &Spec,
+    table: &TableView<'_>,
+    errors: &[f64],
+) -> Result<Option<Section>, Failure> {
+    let chance = &spec.chance;
+    let Some(participation) = chance.drawn() else {
+        return Ok(None);
+    };
+    let losses = match &chance.loss {
+        Some(name) => Some(Losses::load(name).map_err(Failure::bad)?),
+        None => None,
+    };
+    let question = Question {
+        participation: Some(participation),
+        draw_interval_s: chance.draw_interval_s.unwrap_or(spec.sampling.period_s),
+        losses,
+        noise_hz: chance.noise_hz,
+        errors: errors.to_vec(),
+        settings: Settings {
+            bin_gw: BIN_GW,
+            nodes_max: NODES_MAX,
+            horizon_s: spec.requirements.horizon_s.unwrap_or(HORIZON_S),
+        },
+    };
+    let bar = progress::share("prob");
+    let bands = analysis::bands_of(spec, &question);
+    let proofs = analysis::proofs(table, spec, &question, &bands, &bar).map_err(failure)?;
+    let answer = analysis::answer(table, spec, &question, proofs, &bar).map_err(failure)?;
+    let section = prob_figure::section(spec, table.header(), &question, &answer);
+    Ok(Some(section))
+}
+
 fn failure(error: AnalysisError) -> Failure {
     match &error {
         AnalysisError::Chain(ClosedLoopError::Interrupted)
@@ -209,7 +250,7 @@ fn exported(args: &ProbArgs, spec: &Spec, answer: &Answer) -> Result<(), Failure
             answer.horizon_s
         );
         let mut text = Vec::new();
-        export::drn(chain, &note, &mut text).map_err(fail)?;
+        export::drn(chain, answer.below.as_ref(), &note, &mut text).map_err(fail)?;
         write_one(path, &text)?;
     }
     if let Some(base) = &args.prism {
@@ -288,6 +329,11 @@ fn print(spec: &Spec, answer: &Answer, simulated: Option<&Runs>) {
             output::grouped(answer.transitions),
             answer.steps,
             1e3 * answer.reach_hz.unwrap_or(0.0)
+        ));
+    }
+    if let Some(seconds) = answer.seconds_below_49_5 {
+        output::line(format_args!(
+            "below 49.5 Hz: at most {seconds:.3} s are expected, a run that may fail counted as all of it"
         ));
     }
     if let Some(cut) = &answer.cut {

@@ -9,7 +9,7 @@ use serde::de::DeserializeOwned;
 use super::counterfactual::GridArgs;
 use super::files::write_all;
 use super::record::RecordOptions;
-use super::{Failure, OutputArgs, SpecArgs, compare, output, progress};
+use super::{Failure, OutputArgs, SpecArgs, compare, output, prob, progress};
 use lab::compare::CompareConfig;
 use lab::counterfactual::{self, Question};
 use lab::fleet::{self, FleetConfig, INSTANCES_MAX};
@@ -52,6 +52,10 @@ pub(super) struct ReportArgs {
     record: RecordOptions,
     #[command(flatten)]
     grid: GridArgs,
+    /// With chance.participation in the spec: relative errors for which the section on how likely
+    /// the promise is kept examines each band of losses beside the spec's
+    #[arg(long, value_name = "E,E,...", value_delimiter = ',')]
+    errors: Vec<f64>,
     /// Instances of the firmware in the section of the fleet
     #[arg(long, value_name = "N", default_value_t = FLEET_CHARGERS)]
     fleet: usize,
@@ -89,6 +93,11 @@ pub(super) fn run(args: &ReportArgs) -> Result<(), Failure> {
             args.fleet
         )));
     }
+    if let Some(wrong) = args.errors.iter().find(|e| !(**e > 0.0 && **e <= 1.0)) {
+        return Err(Failure::BadInput(format!(
+            "--errors = {wrong}: above 0 and at most 1 is allowed"
+        )));
+    }
     let spec = args.spec.load()?;
     let record = match &args.trace {
         Some(path) => Some(args.record.read(path)?),
@@ -116,6 +125,7 @@ pub(super) fn run(args: &ReportArgs) -> Result<(), Failure> {
         let found = compare::scorecard_of(&study.spec, &table, &config)?;
         findings.scorecard = Some((config, found));
         findings.fleet = Some(fleet_of(&study.spec, &table, args.fleet)?);
+        more.extend(prob::section(&study.spec, &table, &args.errors)?);
         if let Some(record) = &record {
             more.extend(recorded(study, record, &args.grid)?);
         }

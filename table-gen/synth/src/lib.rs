@@ -13,6 +13,7 @@
 //! | [`synthesis`] | a spec | the laws C1, C2, Hold |
 //! | [`compress`] | the laws' freedom | small trees and domains |
 //! | [`emit`] | laws | the bytes of a table |
+//! | [`chosen`] | levels, cell by cell | a table's bytes, without a game |
 //! | [`inspect`], [`budget`] | a table | what is in it, and what it takes of a microcontroller |
 //! | [`pipeline`] | a spec | a table, the whole way |
 //! | [`trigonometry`] | angles | enclosures of sine and cosine, for non-linear plants |
@@ -23,6 +24,7 @@
 pub mod abstraction;
 pub mod budget;
 pub mod checkpoint;
+pub mod chosen;
 pub mod compress;
 pub mod delay;
 pub mod drives;

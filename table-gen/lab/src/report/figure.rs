@@ -16,6 +16,8 @@ pub enum Axis {
     Loss,
     /// Logarithm to base 10 of a table's bytes, told in bytes.
     TableBytes,
+    /// Size of the error of the delivered participation \[%\].
+    DeliveryError,
 }
 
 impl Axis {
@@ -25,6 +27,7 @@ impl Axis {
             Self::Time => "Time since the start [s]",
             Self::Loss => "Lost infeed [GW]",
             Self::TableBytes => "Table [bytes]",
+            Self::DeliveryError => "Error of the delivered participation [%]",
         }
     }
 
@@ -34,6 +37,7 @@ impl Axis {
             Self::Time => "Time [s]",
             Self::Loss => "Loss [GW]",
             Self::TableBytes => "Bytes",
+            Self::DeliveryError => "Error [%]",
         }
     }
 
@@ -43,6 +47,7 @@ impl Axis {
             Self::Time => "time_s",
             Self::Loss => "loss_gw",
             Self::TableBytes => "log10_bytes",
+            Self::DeliveryError => "error_percent",
         }
     }
 
@@ -52,6 +57,7 @@ impl Axis {
             Self::Time => format!("{place:.0}"),
             Self::Loss => format!("{place:.1}"),
             Self::TableBytes => format!("{:.0}", 10f64.powf(place)),
+            Self::DeliveryError => format!("{place:.2}"),
         }
     }
 }
@@ -209,7 +215,7 @@ impl Figure {
             Axis::Time => (0..=TABLE_INTERVALS)
                 .map(|row| start + (end - start) * f64::from(row) / f64::from(TABLE_INTERVALS))
                 .collect(),
-            Axis::Loss | Axis::TableBytes => {
+            Axis::Loss | Axis::TableBytes | Axis::DeliveryError => {
                 let first = self.curves.first();
                 first.map_or(Vec::new(), |c| c.points.iter().map(|(x, _)| *x).collect())
             }

@@ -14,7 +14,7 @@ use crate::bands::BandProof;
 use crate::closed_loop::{self, ClosedLoop, ClosedLoopError};
 use crate::loss::{LossBand, Losses};
 use crate::participation::{Drawn, Participation};
-use crate::value;
+use crate::{reward, value};
 
 /// What is asked, of which table.
 struct Laws<'a> {
@@ -198,6 +198,8 @@ impl<'a> Laws<'a> {
             cut: None,
             failures: None,
             reach_hz: None,
+            seconds_below_49_5: None,
+            below: None,
             chain: None,
             steps: 0,
         }
@@ -285,6 +287,10 @@ impl<'a> Laws<'a> {
         answer.transitions = own.chain.transitions();
         answer.failures = Some(own.failures);
         answer.reach_hz = Some(own.reach_hz);
+        let after = reward::expected(&own.chain, &own.below, own.steps);
+        let horizon_s = self.question.settings.horizon_s;
+        answer.seconds_below_49_5 = Some((own.below_before_s + after).next_up().min(horizon_s));
+        answer.below = Some(own.below);
         answer.steps = own.steps;
         answer.chain = Some(own.chain);
     }

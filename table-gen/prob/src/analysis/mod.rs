@@ -15,6 +15,7 @@ use crate::closed_loop::{ClosedLoopError, Failures, Settings};
 use crate::loss::{LossBand, Losses};
 use crate::normal;
 use crate::participation::Participation;
+use crate::reward::Reward;
 use crate::union::{all_within, draws_in, together};
 
 /// What is asked.
@@ -125,6 +126,12 @@ pub struct Answer {
     pub failures: Option<Failures>,
     /// How far the sets of the chain reach in f \[Hz\].
     pub reach_hz: Option<f64>,
+    /// Upper bound of the expected seconds below 49.5 Hz over the horizon, at the spec's loss, from
+    /// a chain; a run that may fail counts as below all the time.
+    pub seconds_below_49_5: Option<f64>,
+    /// The seconds of the chain's states, to be exported.
+    #[serde(skip)]
+    pub below: Option<Reward>,
     /// The largest chain, to be exported.
     #[serde(skip)]
     pub chain: Option<Chain>,

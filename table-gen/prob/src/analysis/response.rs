@@ -115,6 +115,8 @@ pub(super) fn of_response(spec: &Spec, question: &Question, proofs: Vec<BandProo
         over_time: Vec::new(),
         failures: None,
         reach_hz: None,
+        seconds_below_49_5: None,
+        below: None,
         chain: None,
         steps: 0,
     }

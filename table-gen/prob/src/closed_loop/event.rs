@@ -7,7 +7,7 @@ use model::flow::{Flow, Matrix, Vector, absolute_integral, apply, product, tube}
 use model::interval::Interval;
 use model::spec::Spec;
 
-use super::{ClosedLoopError, Ends, Key, Loop};
+use super::{BELOW_HZ, ClosedLoopError, Ends, Key, Loop, Start};
 use crate::flight::{Ball, NetPower};
 use crate::modes::Modes;
 
@@ -15,16 +15,16 @@ use crate::modes::Modes;
 const PIECES: u32 = 64;
 
 impl Loop<'_> {
-    /// From the event to the first decision: the nodes in which it may come, or nothing where f
+    /// From the event to the first decision: the nodes in which it may come, or failure where f
     /// breaks the containment before. A set that never decides is safe.
     pub(super) fn start(
         &self,
         modes: &Modes,
         (a, b): (&Matrix<STATES>, &Vector<STATES>),
         spec: &Spec,
-        tick_s: f64,
         horizon_ticks: u32,
-    ) -> Result<Vec<Ends>, ClosedLoopError> {
+    ) -> Result<Start, ClosedLoopError> {
+        let tick_s = self.tick_s;
         let initial = &spec.uncertainty.initial;
         let from: Vector<STATES> =
             std::array::from_fn(|d| Interval::hull(initial.lower[d], initial.upper[d]));
@@ -34,7 +34,10 @@ impl Loop<'_> {
         let time = Interval { low: 0.0, high: h };
         let moved = absolute_integral(a, b, tick_s);
         let mut at = Flow::identity();
-        let mut out = Vec::new();
+        let mut out = Start {
+            ends: Vec::new(),
+            ticks_below: 0,
+        };
         for _ in 0..PIECES {
             let flows = product(&within, &at.phi);
             let driven = apply(&flows, b);
@@ -47,8 +50,10 @@ impl Loop<'_> {
                 known + Interval::hull(-most, most)
             });
             if x[0].low < self.containment {
-                out.push(Ends::Failed);
+                out.ends.push(Ends::Failed);
             }
+            // f within the tick of the event is in the hull of its pieces.
+            let before = u32::from(x[0].low < BELOW_HZ);
             let m = modes.vector(&x);
             let spread = m.map(|axis| Interval::point(axis.radius()));
             let ball = Ball {
@@ -59,7 +64,7 @@ impl Loop<'_> {
                     .map(|block| Modes::length(&spread, *block))
                     .collect(),
             };
-            self.watch(ball, net, horizon_ticks, &mut out)?;
+            self.watch(ball, net, (horizon_ticks, before), &mut out)?;
             at = at.then(&step);
         }
         Ok(out)
@@ -70,9 +75,10 @@ impl Loop<'_> {
         &self,
         mut ball: Ball,
         net: NetPower,
-        horizon_ticks: u32,
-        out: &mut Vec<Ends>,
+        (horizon_ticks, before): (u32, u32),
+        out: &mut Start,
     ) -> Result<(), ClosedLoopError> {
+        let mut below = before;
         let state = PhaseState::INITIAL;
         for _ in 0..=horizon_ticks {
             let outcomes = self.regions.outcomes(self.table, state, &ball);
@@ -92,16 +98,20 @@ impl Loop<'_> {
                     cell,
                 };
                 let ends = Ends::In(vec![key]);
-                if !out.contains(&ends) {
-                    out.push(ends);
+                if !out.ends.contains(&ends) {
+                    out.ends.push(ends);
                 }
+                out.ticks_below = out.ticks_below.max(below);
             }
             if outcomes.iter().all(|(next, _)| *next != state) {
                 return Ok(());
             }
-            if self.flights.lowest(&ball, net, 1) < self.containment {
-                out.push(Ends::Failed);
+            let lowest = self.flights.lowest(&ball, net, 1);
+            if lowest < self.containment {
+                out.ends.push(Ends::Failed);
             }
+            below += u32::from(lowest < BELOW_HZ);
+            out.ticks_below = out.ticks_below.max(below);
             let free = self.flights.free(&ball.centre, 1);
             ball = self.flights.after(free, &ball.radius, net, 1);
         }

@@ -3,7 +3,7 @@
 use firmware::phase::{Decision, Phase, PhaseState};
 use model::interval::Interval;
 
-use super::{Decided, Ends, Expanded, Failures, Key, Loop};
+use super::{BELOW_HZ, Branches, Decided, Ends, Expanded, Failure, Failures, Key, Loop};
 use crate::flight::Ball;
 use crate::participation::Bin;
 
@@ -11,11 +11,7 @@ impl Loop<'_> {
     /// The decided states of a node.
     pub(super) fn expand(&self, key: &Key) -> Expanded {
         let ball = self.cover.ball(key.cell, key.left);
-        let state = PhaseState {
-            phase: key.phase,
-            level: key.level,
-            ticks_left: 0,
-        };
+        let state = key.state();
         let mut out = Expanded {
             decided: Vec::new(),
             failures: Failures::default(),
@@ -25,58 +21,83 @@ impl Loop<'_> {
             if key.left && next == state {
                 continue;
             }
-            let failed = vec![(1.0, Ends::Failed)];
-            let Decision::Level(level) = decision else {
-                out.failures.uncovered += 1;
-                out.decided.push(failed);
-                continue;
-            };
-            let Some(bins) = self.bins.get(usize::from(level)) else {
-                out.failures.uncovered += 1;
-                out.decided.push(failed);
-                continue;
-            };
-            // A law decides for a period: I2 is found reached after it at the earliest.
-            let ran = key.age.max(1);
-            let until = match next.phase {
-                Phase::Fixed => u32::from(key.age),
-                _ => u32::from(ran) + self.ticks,
-            };
-            if until > self.settle_ticks {
-                out.failures.late += 1;
-                out.decided.push(failed);
-                continue;
-            }
-            let hull = bins.iter().map(|bin| bin.delivered).reduce(Interval::join);
-            let all = self.net(hull.unwrap_or(Interval::ZERO));
-            if self.flights.lowest(&ball, all, self.ticks) < self.containment {
-                out.failures.containment += 1;
-                out.decided.push(failed);
-                continue;
-            }
-            let decided = match next.phase {
-                Phase::Fixed => self.fixed(&ball, level, bins),
-                _ => {
-                    // Within a horizon of `settle_within_s` nothing can be late: no age is kept.
-                    let age = if self.ages {
-                        ran + self.ticks as u16
-                    } else {
-                        0
-                    };
-                    self.period(&ball, (level, age), bins)
+            let decided = self.decided(key, &ball, next, decision);
+            match decided.failure {
+                Some(Failure::Containment) => out.failures.containment += 1,
+                Some(Failure::Uncovered) => out.failures.uncovered += 1,
+                Some(Failure::Late) => out.failures.late += 1,
+                None => {
+                    let fits = |(_, ends): &&(f64, Ends)| *ends == Ends::Failed;
+                    out.failures.not_fitting += decided.branches.iter().filter(fits).count();
                 }
-            };
-            let fits = |(_, ends): &&(f64, Ends)| *ends == Ends::Failed;
-            out.failures.not_fitting += decided.iter().filter(fits).count();
+            }
             out.decided.push(decided);
         }
         out
     }
 
+    /// One decided state of a node.
+    pub(super) fn decided(
+        &self,
+        key: &Key,
+        ball: &Ball,
+        next: PhaseState,
+        decision: Decision,
+    ) -> Decided {
+        let failed = |why| Decided {
+            branches: vec![(1.0, Ends::Failed)],
+            ticks_below: 0,
+            failure: Some(why),
+        };
+        let Decision::Level(level) = decision else {
+            return failed(Failure::Uncovered);
+        };
+        let Some(bins) = self.bins.get(usize::from(level)) else {
+            return failed(Failure::Uncovered);
+        };
+        // A law decides for a period: I2 is found reached after it at the earliest.
+        let ran = key.age.max(1);
+        let until = match next.phase {
+            Phase::Fixed => u32::from(key.age),
+            _ => u32::from(ran) + self.ticks,
+        };
+        if until > self.settle_ticks {
+            return failed(Failure::Late);
+        }
+        let hull = bins.iter().map(|bin| bin.delivered).reduce(Interval::join);
+        let all = self.net(hull.unwrap_or(Interval::ZERO));
+        let lowest = self.flights.lowest(ball, all, self.ticks);
+        if lowest < self.containment {
+            return failed(Failure::Containment);
+        }
+        let ticks_below = if lowest < BELOW_HZ {
+            self.flights.ticks_below(ball, all, self.ticks, BELOW_HZ)
+        } else {
+            0
+        };
+        let branches = match next.phase {
+            Phase::Fixed => self.fixed(ball, level, bins),
+            _ => {
+                // Within a horizon of `settle_within_s` nothing can be late: no age is kept.
+                let age = if self.ages {
+                    ran + self.ticks as u16
+                } else {
+                    0
+                };
+                self.period(ball, (level, age), bins)
+            }
+        };
+        Decided {
+            branches,
+            ticks_below,
+            failure: None,
+        }
+    }
+
     /// A period of a law.
-    pub(super) fn period(&self, ball: &Ball, (level, age): (u8, u16), bins: &[Bin]) -> Decided {
+    pub(super) fn period(&self, ball: &Ball, (level, age): (u8, u16), bins: &[Bin]) -> Branches {
         let free = self.flights.free(&ball.centre, self.ticks);
-        let mut out = Decided::new();
+        let mut out = Branches::new();
         for bin in bins {
             let net = self.net(bin.delivered);
             let after = self.flights.after(free, &ball.radius, net, self.ticks);
@@ -101,11 +122,11 @@ impl Loop<'_> {
     }
 
     /// Fixed: until f leaves I2, at most a period.
-    pub(super) fn fixed(&self, ball: &Ball, level: u8, bins: &[Bin]) -> Decided {
+    pub(super) fn fixed(&self, ball: &Ball, level: u8, bins: &[Bin]) -> Branches {
         let free: Vec<_> = (0..=self.ticks)
             .map(|t| self.flights.free(&ball.centre, t))
             .collect();
-        let mut out = Decided::new();
+        let mut out = Branches::new();
         let key = |left, cell| Key {
             phase: Phase::Fixed,
             level,
@@ -147,7 +168,7 @@ impl Loop<'_> {
 }
 
 /// Adds a branch; one that ends as the last does is added to it, rounded down.
-fn push(out: &mut Decided, probability: f64, ends: Ends) {
+fn push(out: &mut Branches, probability: f64, ends: Ends) {
     match out.last_mut() {
         Some((sum, last)) if *last == ends => {
             let whole = *sum + probability;

@@ -1,13 +1,13 @@
 //! All nodes that are reached, and the chain that they make.
 
-use std::collections::HashMap;
-
 use rayon::prelude::*;
 
+use super::known::{Known, NodeSet};
 use super::{
-    ClosedLoop, ClosedLoopError, Ends, Expanded, Failures, Key, Loop, Settings, Unfollowed,
+    ClosedLoop, ClosedLoopError, Ends, Expanded, Failures, Loop, Settings, Start, Unfollowed,
 };
 use crate::chain::{Branch, Chain, FAILED, SAFE};
+use crate::reward::{Reward, seconds_of};
 
 /// Nodes that are expanded between two looks at the clock.
 const TOGETHER: usize = 4096;
@@ -16,19 +16,20 @@ impl Loop<'_> {
     /// Expands all nodes that are reached, and makes the chain.
     pub(super) fn explore(
         &self,
-        start: Vec<Ends>,
+        start: &Start,
         steps: u32,
         settings: &Settings,
         go_on: &dyn Fn(usize, usize) -> bool,
     ) -> Result<ClosedLoop, ClosedLoopError> {
         let mut known = Known::default();
         let mut initial = Vec::new();
-        for ends in &start {
+        for ends in &start.ends {
             initial.push(known.set(ends));
         }
         let mut failures = Failures::default();
         // Branches of all decided states, and where those of a node begin.
         let (mut rows, mut branches, mut first) = (vec![0usize; 3], Vec::new(), Vec::new());
+        let mut seconds = vec![0.0; 2];
         let (mut expanded, mut depth, mut layer_end) = (0, 0, known.keys.len());
         let mut cut = None;
         while expanded < known.keys.len() {
@@ -52,7 +53,8 @@ impl Loop<'_> {
                 failures.late += node.failures.late;
                 failures.not_fitting += node.failures.not_fitting;
                 for decided in node.decided {
-                    for (probability, ends) in decided {
+                    seconds.push(seconds_of(decided.ticks_below, self.tick_s));
+                    for (probability, ends) in decided.branches {
                         let set = known.set(&ends);
                         branches.push(Branch { probability, set });
                     }
@@ -82,6 +84,7 @@ impl Loop<'_> {
             let probability = 1.0;
             branches.push(Branch { probability, set });
             rows.push(branches.len());
+            seconds.push(0.0);
             (rows.len() - 2) as u32
         } else {
             SAFE
@@ -130,53 +133,11 @@ impl Loop<'_> {
             cut,
             failures,
             reach_hz: self.cover.radius().iter().sum(),
+            below: Reward {
+                seconds,
+                failed_s: settings.horizon_s,
+            },
+            below_before_s: seconds_of(start.ticks_below, self.tick_s),
         })
-    }
-}
-
-/// Sets of nodes by their numbers.
-enum NodeSet {
-    Failed,
-    Nodes(Vec<u32>),
-}
-
-/// Nodes and sets that are known, each once.
-#[derive(Default)]
-struct Known {
-    keys: Vec<Key>,
-    numbers: HashMap<Key, u32>,
-    sets: Vec<NodeSet>,
-    positions: HashMap<Vec<u32>, u32>,
-    failed: Option<u32>,
-}
-
-impl Known {
-    fn node(&mut self, key: Key) -> u32 {
-        let next = self.keys.len() as u32;
-        *self.numbers.entry(key).or_insert_with(|| {
-            self.keys.push(key);
-            next
-        })
-    }
-
-    fn set(&mut self, ends: &Ends) -> u32 {
-        let next = self.sets.len() as u32;
-        match ends {
-            Ends::Failed => {
-                if self.failed.is_none() {
-                    self.sets.push(NodeSet::Failed);
-                }
-                *self.failed.get_or_insert(next)
-            }
-            Ends::In(keys) => {
-                let nodes: Vec<u32> = keys.iter().map(|key| self.node(*key)).collect();
-                if let Some(known) = self.positions.get(&nodes) {
-                    return *known;
-                }
-                self.positions.insert(nodes.clone(), next);
-                self.sets.push(NodeSet::Nodes(nodes));
-                next
-            }
-        }
     }
 }

@@ -28,11 +28,16 @@
 //! fails at its first step. Its value is 1 with no step to go and 0 with any, which is a lower
 //! bound whatever comes after it. The chain stays a chain, and its bound a bound for every horizon.
 
+mod covered;
 mod event;
 mod expand;
 mod explore;
+mod known;
+mod offers;
 
-use firmware::phase::Phase;
+use std::collections::HashSet;
+
+use firmware::phase::{Phase, PhaseState};
 use firmware::table::TableView;
 use firmware::units::{MICRO, STATES};
 use model::interval::Interval;
@@ -47,6 +52,12 @@ use crate::flight::{Flights, NetPower};
 use crate::modes::Modes;
 pub use crate::modes::ModesError;
 use crate::participation::{Bin, Drawn, Participation};
+use crate::reward::Reward;
+pub(crate) use offers::Offered;
+pub use offers::Place;
+
+/// Below this frequency seconds are counted \[Hz\]: 49.5 Hz, as a deviation.
+pub const BELOW_HZ: f64 = -0.5;
 
 /// How finely the chain is built.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -125,6 +136,10 @@ pub struct ClosedLoop {
     pub failures: Failures,
     /// How far the sets reach in f \[Hz\].
     pub reach_hz: f64,
+    /// Seconds below [`BELOW_HZ`] that each state may bring.
+    pub below: Reward,
+    /// Seconds below [`BELOW_HZ`] before the first decision, at most.
+    pub below_before_s: f64,
 }
 
 /// What the firmware remembers, and a point of the cover.
@@ -139,6 +154,25 @@ struct Key {
     cell: [i32; STATES],
 }
 
+impl Key {
+    /// What the firmware remembers, at a tick at which it decides.
+    fn state(&self) -> PhaseState {
+        PhaseState {
+            phase: self.phase,
+            level: self.level,
+            ticks_left: 0,
+        }
+    }
+}
+
+/// Why a decided state fails whatever is drawn.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Failure {
+    Containment,
+    Uncovered,
+    Late,
+}
+
 /// Where a branch may end.
 #[derive(Debug, Clone, PartialEq)]
 enum Ends {
@@ -146,8 +180,25 @@ enum Ends {
     In(Vec<Key>),
 }
 
-/// A decided state: its branches.
-type Decided = Vec<(f64, Ends)>;
+/// Branches of a decided state.
+type Branches = Vec<(f64, Ends)>;
+
+/// What comes before the first decision.
+struct Start {
+    /// Where the first decision may be.
+    ends: Vec<Ends>,
+    /// Ticks before it in which f may be below [`BELOW_HZ`].
+    ticks_below: u32,
+}
+
+/// A decided state.
+struct Decided {
+    branches: Branches,
+    /// Ticks of its step in which f may be below [`BELOW_HZ`].
+    ticks_below: u32,
+    /// Why it fails whatever is drawn, if it does.
+    failure: Option<Failure>,
+}
 
 /// An expanded node.
 struct Expanded {
@@ -166,6 +217,7 @@ struct Loop<'a> {
     fleet: Interval,
     loss: Interval,
     ticks: u32,
+    tick_s: f64,
     containment: f64,
     settle_ticks: u32,
     /// Whether an excursion can be late within the horizon.
@@ -189,7 +241,20 @@ pub fn build(
     go_on: &dyn Fn(usize, usize) -> bool,
 ) -> Result<ClosedLoop, ClosedLoopError> {
     let (whole, start, steps) = prepared(table, spec, participation, settings)?;
-    whole.explore(start, steps, settings, go_on)
+    whole.explore(&start, steps, settings, go_on)
+}
+
+/// The chain in which the places of `open` offer every level.
+pub(crate) fn offered(
+    table: &TableView<'_>,
+    spec: &Spec,
+    participation: &Participation,
+    settings: &Settings,
+    open: &HashSet<Place>,
+    go_on: &dyn Fn(usize, usize) -> bool,
+) -> Result<Offered, ClosedLoopError> {
+    let (whole, start, steps) = prepared(table, spec, participation, settings)?;
+    whole.offer(&start.ends, steps, settings, open, go_on)
 }
 
 /// What the chain is made from: the loop, where it begins, and the steps of the horizon.
@@ -198,8 +263,8 @@ fn prepared<'a>(
     spec: &Spec,
     participation: &Participation,
     settings: &Settings,
-) -> Result<(Loop<'a>, Vec<Ends>, u32), ClosedLoopError> {
-    covered(table, spec)?;
+) -> Result<(Loop<'a>, Start, u32), ClosedLoopError> {
+    covered::covered(table, spec)?;
     let positive = |name, found: f64| {
         if found > 0.0 && found <= 1e4 {
             return Ok(());
@@ -259,6 +324,7 @@ fn prepared<'a>(
         fleet: Interval::point(plant.fleet),
         loss,
         ticks,
+        tick_s,
         containment: spec
             .requirements
             .containment_hz
@@ -268,59 +334,8 @@ fn prepared<'a>(
         flights,
         cover,
     };
-    let start = whole.start(&modes, (&a, &b), spec, tick_s, horizon_ticks)?;
+    let start = whole.start(&modes, (&a, &b), spec, horizon_ticks)?;
     Ok((whole, start, steps_in(horizon_ticks, ticks)))
-}
-
-/// What the chain covers.
-fn covered(table: &TableView<'_>, spec: &Spec) -> Result<(), ClosedLoopError> {
-    let header = table.header();
-    let unsupported = |what: &str, remedy| {
-        Err(ClosedLoopError::Unsupported {
-            what: what.to_owned(),
-            remedy,
-        })
-    };
-    if header.always_on {
-        return unsupported("a response", "its errors are bounded by a union of draws");
-    }
-    if header.stay || spec.requirements.stay {
-        return unsupported("a table with Hold", "tables without (stay = false) are");
-    }
-    if header.delay_ticks > 0 || spec.uncertainty.actuation_delay_s.most_s() > 0.0 {
-        return unsupported(
-            "commands that act late",
-            "uncertainty.actuation_delay_s = 0 is",
-        );
-    }
-    if spec.uncertainty.own_clocks {
-        return unsupported(
-            "chargers with own clocks",
-            "uncertainty.own_clocks = false is",
-        );
-    }
-    for [low, high] in [
-        spec.inertia_band(),
-        spec.governor_gain_band(),
-        spec.damping_band(),
-    ] {
-        if low < high {
-            return unsupported("a plant known in bands", "one plant is");
-        }
-    }
-    if spec.uncertainty.participation > 0.0 || spec.uncertainty.participation_absolute > 0.0 {
-        return unsupported(
-            "a participation error in the spec beside the one that is drawn",
-            "uncertainty.participation = 0 is",
-        );
-    }
-    if spec.uncertainty.hostile() > 0.0 {
-        return unsupported(
-            "a hostile share (uncertainty.hostile_share)",
-            "a fleet without one is",
-        );
-    }
-    Ok(())
 }
 
 impl Loop<'_> {

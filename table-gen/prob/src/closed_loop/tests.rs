@@ -1,6 +1,6 @@
 //! Real runs are followed through the nodes: wherever a run goes, the nodes go with it.
 
-use firmware::phase::{Decision, PhaseState};
+use firmware::phase::Decision;
 use firmware::table::TableView;
 use firmware::units::State;
 use model::flow::Flow;
@@ -95,7 +95,7 @@ fn real_runs_stay_in_the_nodes() {
         while real.x[0] >= -0.3 {
             real.fly(-2.0);
         }
-        let begun = start.iter().find_map(|ends| match ends {
+        let begun = start.ends.iter().find_map(|ends| match ends {
             Ends::In(keys) => keys
                 .iter()
                 .find(|key| real.is_in(&whole.cover.ball(key.cell, key.left))),

@@ -1,0 +1,57 @@
+//! Which tables and specs the chain covers.
+
+use firmware::table::TableView;
+use model::spec::Spec;
+
+use super::ClosedLoopError;
+
+/// What the chain covers.
+pub(super) fn covered(table: &TableView<'_>, spec: &Spec) -> Result<(), ClosedLoopError> {
+    let header = table.header();
+    let unsupported = |what: &str, remedy| {
+        Err(ClosedLoopError::Unsupported {
+            what: what.to_owned(),
+            remedy,
+        })
+    };
+    if header.always_on {
+        return unsupported("a response", "its errors are bounded by a union of draws");
+    }
+    if header.stay || spec.requirements.stay {
+        return unsupported("a table with Hold", "tables without (stay = false) are");
+    }
+    if header.delay_ticks > 0 || spec.uncertainty.actuation_delay_s.most_s() > 0.0 {
+        return unsupported(
+            "commands that act late",
+            "uncertainty.actuation_delay_s = 0 is",
+        );
+    }
+    if spec.uncertainty.own_clocks {
+        return unsupported(
+            "chargers with own clocks",
+            "uncertainty.own_clocks = false is",
+        );
+    }
+    for [low, high] in [
+        spec.inertia_band(),
+        spec.governor_gain_band(),
+        spec.damping_band(),
+    ] {
+        if low < high {
+            return unsupported("a plant known in bands", "one plant is");
+        }
+    }
+    if spec.uncertainty.participation > 0.0 || spec.uncertainty.participation_absolute > 0.0 {
+        return unsupported(
+            "a participation error in the spec beside the one that is drawn",
+            "uncertainty.participation = 0 is",
+        );
+    }
+    if spec.uncertainty.hostile() > 0.0 {
+        return unsupported(
+            "a hostile share (uncertainty.hostile_share)",
+            "a fleet without one is",
+        );
+    }
+    Ok(())
+}

@@ -1,0 +1,239 @@
+//! `maximise TABLE --spec SPEC`: other levels where that makes the bound of `prob` larger.
+
+use std::path::PathBuf;
+
+use ::prob::closed_loop::{self, Settings};
+use ::prob::maximise::{self, Place};
+use ::prob::participation::Participation;
+use ::prob::value;
+use firmware::table::{Law, TableView};
+use firmware::units::STATES;
+use model::spec::Spec;
+use serde::Serialize;
+use synth::chosen::Chosen;
+use synth::problem::Problem;
+
+use super::files::write_one;
+use super::prob::{BIN_GW, HORIZON_S, NODES_MAX};
+use super::{Failure, Overrides, output, progress};
+
+/// Arguments of `maximise`.
+#[derive(Debug, clap::Args)]
+pub(super) struct MaximiseArgs {
+    /// The table whose levels are the first; it may be one of another spec on the same cells
+    #[arg(value_name = "TABLE")]
+    table: PathBuf,
+    /// Name of a shipped spec, or path of a TOML file
+    #[arg(long, value_name = "SPEC")]
+    spec: String,
+    #[command(flatten)]
+    overrides: Overrides,
+    #[command(flatten)]
+    output: super::OutputArgs,
+    /// Error of the delivered participation, drawn anew each period, as `prob` takes it; default:
+    /// chance.participation
+    #[arg(long, value_name = "KIND")]
+    participation: Option<Participation>,
+    /// Time over which the promise is bounded; default: the spec's horizon, or 120 [s]
+    #[arg(long, value_name = "S")]
+    horizon_s: Option<f64>,
+    /// Width of a bin of the fleet's power [GW]
+    #[arg(long, value_name = "GW", default_value_t = BIN_GW)]
+    bin_gw: f64,
+    /// Nodes after which a chain is followed no more; what is not followed counts as failed
+    #[arg(long, value_name = "N", default_value_t = NODES_MAX)]
+    nodes_max: usize,
+    /// Steps before a possible failure at which levels may change
+    #[arg(long, value_name = "N", default_value_t = 2)]
+    back: u32,
+    /// Most rounds of changes
+    #[arg(long, value_name = "N", default_value_t = 4)]
+    rounds: u32,
+    /// The new table
+    #[arg(long, value_name = "FILE")]
+    out: PathBuf,
+}
+
+/// A round of changes.
+#[derive(Debug, Serialize)]
+struct Round {
+    /// Bound of the levels before it.
+    lower_bound: f64,
+    /// Value with a level for each set.
+    at_most: f64,
+    opened: usize,
+    states: usize,
+    unfollowed: usize,
+    changes: usize,
+}
+
+#[derive(Debug, Serialize)]
+struct MaximiseReport<'r> {
+    spec: &'r str,
+    participation: String,
+    horizon_s: f64,
+    before: f64,
+    lower_bound: f64,
+    states: usize,
+    rounds: &'r [Round],
+    changed_cells: usize,
+    asked_cells: usize,
+    table_bytes: usize,
+    table: String,
+}
+
+/// Runs the command.
+pub(super) fn run(args: &MaximiseArgs) -> Result<(), Failure> {
+    let spec = args.overrides.load(&args.spec)?;
+    let (kind, settings) = question(args, &spec)?;
+    progress::catch_interrupts();
+    let bytes = std::fs::read(&args.table)
+        .map_err(|error| Failure::BadInput(format!("{}: {error}", args.table.display())))?;
+    let problem = Problem::new(&spec).map_err(Failure::bad)?;
+    let first = Chosen::of(&problem, &view(&bytes)?).map_err(Failure::bad)?;
+    let go_on = |_: usize, _: usize| !progress::interrupted();
+    let mut chosen = first.clone();
+    let mut best: Option<(f64, Chosen, Vec<Place>)> = None;
+    let mut rounds = Vec::new();
+    let mut before = 0.0;
+    for round in 0..=args.rounds {
+        let dense = chosen.dense(&problem).map_err(Failure::bad)?;
+        let table = view(&dense)?;
+        // After the last changes there is only their bound to be found.
+        let back = (round < args.rounds).then_some(args.back);
+        let found = maximise::improve(&table, &spec, &kind, &settings, back, &go_on);
+        let found = found.map_err(|error| match error {
+            closed_loop::ClosedLoopError::Interrupted => Failure::No(error.to_string()),
+            _ => Failure::bad(error),
+        })?;
+        if round == 0 {
+            before = found.before;
+        }
+        if best
+            .as_ref()
+            .is_none_or(|(bound, ..)| found.before > *bound)
+        {
+            best = Some((found.before, chosen.clone(), found.asked_now));
+        }
+        rounds.push(Round {
+            lower_bound: found.before,
+            at_most: found.at_most,
+            opened: found.opened,
+            states: found.states,
+            unfollowed: found.unfollowed,
+            changes: found.changes.len(),
+        });
+        if found.changes.is_empty() {
+            break;
+        }
+        for change in &found.changes {
+            let Place { law, cell } = change.place;
+            chosen.set(&problem, law, cell, change.level);
+        }
+    }
+    let Some((bound, chosen, asked)) = best.filter(|(bound, ..)| *bound > before) else {
+        return Err(Failure::No(format!(
+            "no other levels with a larger bound than {before:.9} were found; --back and --rounds look farther, a smaller --bin-gw leaves the adversary less"
+        )));
+    };
+    let asked: Vec<(Law, [u16; STATES])> =
+        asked.iter().map(|place| (place.law, place.cell)).collect();
+    let small = chosen.small(&problem, &asked).map_err(Failure::bad)?;
+    // What is told is the bound of these very bytes.
+    let built = closed_loop::build(&view(&small)?, &spec, &kind, &settings, &go_on);
+    let built = built.map_err(Failure::bad)?;
+    let lower_bound = value::bounds(&built.chain, built.steps)
+        .last()
+        .copied()
+        .unwrap_or(0.0);
+    write_one(&args.out, &small)?;
+    let report = MaximiseReport {
+        spec: &spec.name,
+        participation: kind.to_string(),
+        horizon_s: settings.horizon_s,
+        before,
+        lower_bound,
+        states: built.chain.states(),
+        rounds: &rounds,
+        changed_cells: chosen.differences(&first),
+        asked_cells: asked.len(),
+        table_bytes: small.len(),
+        table: args.out.display().to_string(),
+    };
+    if args.output.json {
+        return output::json(&report);
+    }
+    print(&report, bound);
+    Ok(())
+}
+
+fn view(bytes: &[u8]) -> Result<TableView<'_>, Failure> {
+    TableView::parse(bytes)
+        .map_err(|error| Failure::BadInput(format!("the firmware rejects the table: {error:?}")))
+}
+
+/// How the participation is drawn, and how finely the chain is built.
+fn question(args: &MaximiseArgs, spec: &Spec) -> Result<(Participation, Settings), Failure> {
+    let Some(kind) = args.participation.or(spec.chance.drawn()) else {
+        return Err(Failure::BadInput(
+            "--participation or the key chance.participation is needed: exact is one".to_owned(),
+        ));
+    };
+    if args.rounds == 0 || args.rounds > 100 || args.back > 100 {
+        return Err(Failure::BadInput(
+            "--rounds: 1 to 100, --back: 0 to 100".to_owned(),
+        ));
+    }
+    let horizon_s = args
+        .horizon_s
+        .or(spec.requirements.horizon_s)
+        .unwrap_or(HORIZON_S);
+    let settings = Settings {
+        bin_gw: args.bin_gw,
+        nodes_max: args.nodes_max,
+        horizon_s,
+    };
+    Ok((kind, settings))
+}
+
+/// The result for people.
+fn print(report: &MaximiseReport<'_>, bound: f64) {
+    let mut table = output::table(&[
+        "round",
+        "bound",
+        "at most",
+        "open cells",
+        "states",
+        "changes",
+    ]);
+    for (index, round) in report.rounds.iter().enumerate() {
+        table.add_row(vec![
+            index.to_string(),
+            format!("{:.9}", round.lower_bound),
+            format!("{:.9}", round.at_most),
+            output::grouped(round.opened),
+            output::grouped(round.states),
+            output::grouped(round.changes),
+        ]);
+    }
+    output::line(table);
+    output::line(format_args!(
+        "{}: P(psi over {} s) >= {:.9}, before {:.9}; {} cells have another level, {} are asked for",
+        report.spec,
+        report.horizon_s,
+        report.lower_bound,
+        report.before,
+        output::grouped(report.changed_cells),
+        output::grouped(report.asked_cells)
+    ));
+    if report.lower_bound < bound {
+        output::line(format_args!(
+            "the small table has less than the dense one ({bound:.9}): a cell past the horizon is not in it"
+        ));
+    }
+    output::line(format_args!(
+        "wrote {} ({} bytes); `prob` bounds it as any other table",
+        report.table,
+        output::grouped(report.table_bytes)
+    ));
+}
