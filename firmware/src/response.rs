@@ -143,6 +143,11 @@ impl LevelOffset {
         Self(spread(serial))
     }
 
+    /// The shift as a share of the levels' distance, in units of 2^-32.
+    pub const fn units(self) -> u32 {
+        self.0
+    }
+
     /// The shift for levels `step` apart \[ppm\]: 0..step.
     const fn ppm(self, step: u32) -> u32 {
         ((self.0 as u64 * step as u64) >> 32) as u32

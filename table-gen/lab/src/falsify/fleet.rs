@@ -26,7 +26,7 @@ use model::verdict::{ClaimName, RealPath};
 use rayon::prelude::*;
 
 use super::adversaries::Random;
-use super::crowd::{Crowd, CrowdTimes, PARTS};
+use super::crowd::{Crowd, CrowdTimes, PARTS, fewest_members};
 use super::found::Falsification;
 
 /// Chargers of a crowd, least and most.
@@ -153,7 +153,7 @@ impl Draw {
         let initial = &spec.uncertainty.initial;
         let initial = std::array::from_fn(|d| within([initial.lower[d], initial.upper[d]]));
         let losses = losses(spec, &mut random);
-        let (least, most) = MEMBERS;
+        let (least, most) = (fewest(spec, MEMBERS.0), MEMBERS.1);
         Self {
             plant,
             initial,
@@ -170,6 +170,11 @@ impl Draw {
             self.strategy, self.members, self.losses, self.plant.inertia, self.seed
         )
     }
+}
+
+/// Fewest chargers within a spec's hypotheses, at least so many.
+fn fewest(spec: &Spec, least: u64) -> u64 {
+    fewest_members(spec.uncertainty.level_discrepancy, least, MEMBERS.1)
 }
 
 /// A loss by the spec's profile.
@@ -288,7 +293,10 @@ impl<'a> Fleets<'a> {
             violation: None,
         };
         let mut random = Random::new(seed);
-        let (least, most) = SAMPLED_MEMBERS;
+        // Where the proof knows the levels, as few as are shifted that evenly.
+        let (least, more) = SAMPLED_MEMBERS;
+        let least = fewest(self.spec, least);
+        let most = least + more - 1;
         while out.trajectories < runs && out.violation.is_none() {
             let count = (runs - out.trajectories).min(SAMPLED_BATCH);
             let draws: Vec<Draw> = (0..count)
