@@ -70,7 +70,7 @@ pub fn run(bytes: &[u8]) -> bool {
         }
         for key in Key::ALL {
             let about = key.about();
-            let value = device.values().get(key);
+            let value = device.in_force().get(key);
             assert!((about.least..=about.most).contains(&value));
         }
     }

@@ -105,7 +105,7 @@ impl<F: MultiwriteNorFlash> Device<F> {
     }
 
     /// The settings in force.
-    pub const fn values(&self) -> &Values {
+    pub const fn in_force(&self) -> &Values {
         &self.in_force
     }
 

@@ -194,7 +194,7 @@ fn settings_are_checked_and_kept() {
         let order = Order::Settings(pairs(&[(Key::UserLimit, 6_000), (key, value)]));
         bench.wait(GAP_MS);
         assert_eq!(bench.order_with(&KEY, &order), Answer::Refused(refusal));
-        assert_eq!(bench.device.values().get(Key::UserLimit), 80_000);
+        assert_eq!(bench.device.in_force().get(Key::UserLimit), 80_000);
     }
     bench.wait(GAP_MS);
     let mut unknown = Pairs::new();
@@ -205,7 +205,7 @@ fn settings_are_checked_and_kept() {
     bench.wait(GAP_MS);
     assert!(bench.order(&Order::Defaults));
     bench.restart();
-    assert_eq!(bench.device.values(), &settings::values::Values::DEFAULT);
+    assert_eq!(bench.device.in_force(), &settings::values::Values::DEFAULT);
 }
 
 #[test]
