@@ -216,8 +216,8 @@ mod tests {
         }
     }
 
-    /// By a program in another language the discrepancy is above 0.04 for 64 consecutive numbers and
-    /// not for 65 to 200, and above 0.02 for 138 and not from there on.
+    /// By a program in another language the discrepancy is above 0.04 for 64 consecutive numbers
+    /// and not for 65 to 200, and above 0.02 for 138 and not from there on.
     #[test]
     fn crowds_are_as_even_as_the_proof_assumes() {
         assert_eq!(fewest_members(None, 8, 200), 8);

@@ -24,13 +24,14 @@
 //! A command lies less than the smallest change c from its target, and is 0 or 1 exactly where the
 //! target is. Where the proof knows how evenly the chargers' levels are shifted
 //! (`uncertainty.level_discrepancy`), the mean of those with targets up to V⁺ is at most V⁺ and a
-//! part of c (`verify::response`, the lines), but 1 from 1 - c on; from below the same. It acts from d after s until the next one acts, d in \[d₁, d₂\], each time another.
-//! So what acts at time t was decided in \[t - d₂ - T, t - d₁\], and each charger's response lies
-//! between the least V⁻ - c and the greatest V⁺ + c of that time. So does the mean over any number
-//! of chargers, which is the convex hull; where the levels are known, the mean over the fleet of
-//! which they are lies in the narrower one. Of a participation u the grid gets anything from
-//! u (1 - ρ) - α to u (1 + ρ) + α, at most everything. A share σ of the chargers that is hostile
-//! gives anything: then the rest of the fleet counts (1 - σ) times, and σ is added above.
+//! part of c (`verify::response`, the lines), but 1 from 1 - c on; from below the same. It acts
+//! from d after s until the next one acts, d in \[d₁, d₂\], each time another. So what acts at time
+//! t was decided in \[t - d₂ - T, t - d₁\], and each charger's response lies between the least V⁻ -
+//! c and the greatest V⁺ + c of that time. So does the mean over any number of chargers, which is
+//! the convex hull; where the levels are known, the mean over the fleet of which they are lies in
+//! the narrower one. Of a participation u the grid gets anything from u (1 - ρ) - α to u (1 + ρ) +
+//! α, at most everything. A share σ of the chargers that is hostile gives anything: then the rest
+//! of the fleet counts (1 - σ) times, and σ is added above.
 //!
 //! ## Time
 //! Time goes in parts of a tick, as the fleet's does: decisions are made and powers change where a

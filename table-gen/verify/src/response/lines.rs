@@ -13,9 +13,9 @@
 //! high(min f(s), most m)   high(z, m) = v = 0 ? 0 : min(1, v + step), v at z - reading
 //! ```
 //!
-//! with step = smallest_change, and the delivered participation between `(1 - σ)(1 - δ) low - α` and `(1 - σ) high (1 + δ) + α +
-//! σ`, inside \[0, 1\]: σ the hostile share, δ and α the relative and absolute errors of the
-//! delivery.
+//! with step = smallest_change, and the delivered participation between `(1 - σ)(1 - δ) low - α`
+//! and `(1 - σ) high (1 + δ) + α + σ`, inside \[0, 1\]: σ the hostile share, δ and α the relative
+//! and absolute errors of the delivery.
 //!
 //! # Levels that are shifted against each other
 //! Commands are not arbitrary: charger i has the levels o_i + k smallest_change, and 0 and 1. Let c
@@ -33,8 +33,8 @@
 //!
 //! D is said of the whole fleet, of which a hostile share σ may be whichever chargers suit the
 //! adversary. An arc of length L holds at least L - D of the fleet, so at least L - D - σ of it are
-//! honest, out of 1 - σ; as a share of the honest that is no less than L - D - σ. So the honest have
-//! D + σ in place of D above. So
+//! honest, out of 1 - σ; as a share of the honest that is no less than L - D - σ. So the honest
+//! have D + σ in place of D above. So
 //!
 //! ```text
 //! low(z, m)  = v >= 1 ? 1 : v <= c ? 0 : v - step
@@ -44,10 +44,11 @@
 //! D = 1 says nothing of the levels and gives the functions above. The device rounds an offset down
 //! to 1 ppm, which step takes in.
 //!
-//! Both functions are piecewise linear in z with one jump each, or two. A line that lies below (above) the function at the
-//! ends of an interval, at its kinks and at the lower (upper) side of its jump lies below (above)
-//! it on the whole interval; the supporting lines of the convex hull of those points are such
-//! lines. Which of them is best depends on where the worst trajectory runs, so several are kept.
+//! Both functions are piecewise linear in z with one jump each, or two. A line that lies below
+//! (above) the function at the ends of an interval, at its kinks and at the lower (upper) side of
+//! its jump lies below (above) it on the whole interval; the supporting lines of the convex hull of
+//! those points are such lines. Which of them is best depends on where the worst trajectory runs,
+//! so several are kept.
 
 use super::fleet_loop::{Assumed, RealLaw};
 use model::interval::Interval;

@@ -227,7 +227,8 @@ fn no_fleet_leaves_its_bounds_under_a_loss_in_stages() {
 }
 
 /// Before the event nothing is lost. A band that does not hold 0 is entered by a jump, which
-/// counts: bounds for a loss that then moves or rises hold every fleet whose loss jumps there and stays.
+/// counts: bounds for a loss that then moves or rises hold every fleet whose loss jumps there and
+/// stays.
 #[test]
 fn a_band_of_losses_that_does_not_hold_zero_is_entered_from_zero() {
     let loss = Interval::hull(0.8, 0.84);
