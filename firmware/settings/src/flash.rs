@@ -11,7 +11,7 @@
 //! | bytes | what |
 //! |---|---|
 //! | all but the last [`MARKS`] words | what is seen, addressed from 0 without gaps |
-//! | [`MARKS`] words | marks: blank, [`BEGUN`] while the next page is erased, then 0 |
+//! | [`MARKS`] words | marks: blank, `BEGUN` while the next page is erased, then 0 |
 //!
 //! A mark is struck out by clearing its bits, so the flash must allow a word to be written twice
 //! ([`MultiwriteNorFlash`]); flash with error correction over a word does not.

@@ -57,7 +57,7 @@ pub fn write(values: &Values, build: Build, buffer: &mut [u8; RECORD_MAX]) -> us
 /// The values of a record.
 ///
 /// # Errors
-/// Bytes that [`write`] did not write for this build.
+/// Bytes that [`write()`] did not write for this build.
 pub fn read(bytes: &[u8], build: Build) -> Result<Values, RecordError> {
     let (version, rest) = bytes.split_first().ok_or(RecordError::Malformed)?;
     if *version != RECORD_VERSION {
