@@ -45,7 +45,7 @@ pub enum Ask<'a> {
         /// An [`Order`] as a record.
         #[serde(borrow)]
         order: &'a [u8],
-        /// [`crate::seal::core::order_mac`].
+        /// [`crate::seal::DeviceKey::order_mac`].
         mac: [u8; MAC_LEN],
     },
     /// The first device key of a charger that has none.
@@ -81,7 +81,7 @@ pub enum Order {
     },
     /// Every setting at its default.
     Defaults,
-    /// Another device key, masked by [`crate::seal::core::mask`].
+    /// Another device key, masked by [`crate::seal::DeviceKey::mask`].
     NewKey {
         /// New key, exclusive or with the mask.
         masked: [u8; KEY_LEN],
@@ -217,7 +217,7 @@ pub enum Answer<'a> {
     },
     /// The order was carried out.
     Done {
-        /// [`crate::seal::core::done_mac`].
+        /// [`crate::seal::DeviceKey::done_mac`].
         mac: [u8; MAC_LEN],
     },
     /// The first device key was taken.
