@@ -20,6 +20,7 @@
 #![forbid(unsafe_code)]
 
 pub mod budget;
+pub mod discrepancy;
 pub mod exponential;
 pub mod flow;
 pub mod governor;

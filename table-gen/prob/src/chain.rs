@@ -7,6 +7,11 @@
 
 use std::collections::HashMap;
 
+use rayon::prelude::*;
+
+/// Sets and states in one piece of work.
+pub(crate) const TOGETHER: usize = 2048;
+
 /// The state in which the claim is broken.
 pub const FAILED: u32 = 0;
 /// The state from which it cannot be broken any more.
@@ -167,6 +172,25 @@ impl ChainBuilder {
 }
 
 impl Chain {
+    /// Of each set the value that `pick` takes among its members', from `neutral` on.
+    pub(crate) fn over_sets(
+        &self,
+        values: &[f64],
+        neutral: f64,
+        pick: impl Fn(f64, f64) -> f64 + Sync,
+        out: &mut [f64],
+    ) {
+        out.par_iter_mut()
+            .with_min_len(TOGETHER)
+            .enumerate()
+            .for_each(|(set, out)| {
+                let members = self.members(set as u32).iter();
+                *out = members
+                    .map(|state| values[*state as usize])
+                    .fold(neutral, &pick);
+            });
+    }
+
     /// States, [`FAILED`] and [`SAFE`] among them.
     pub fn states(&self) -> usize {
         self.rows.len() - 1

@@ -17,10 +17,7 @@
 
 use rayon::prelude::*;
 
-use crate::chain::{Branch, Chain, FAILED, SAFE};
-
-/// Groups and states in one piece of work.
-const TOGETHER: usize = 1024;
+use crate::chain::{Branch, Chain, FAILED, SAFE, TOGETHER};
 
 /// What is asked of the controller.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -134,16 +131,7 @@ impl Choices {
     /// One step; the largest change of a group.
     fn step(&self, worst: &mut [f64], values: &mut Values) -> f64 {
         let (chain, groups) = (&self.chain, &values.groups);
-        worst
-            .par_iter_mut()
-            .with_min_len(TOGETHER)
-            .enumerate()
-            .for_each(|(set, worst)| {
-                let members = chain.members(set as u32).iter();
-                *worst = members
-                    .map(|group| groups[*group as usize])
-                    .fold(1.0, f64::min);
-            });
+        chain.over_sets(groups, 1.0, f64::min, worst);
         let worst = &*worst;
         values.states[2..]
             .par_iter_mut()

@@ -22,10 +22,7 @@
 
 use rayon::prelude::*;
 
-use crate::chain::{Chain, FAILED, SAFE};
-
-/// Sets and states in one piece of work.
-const TOGETHER: usize = 2048;
+use crate::chain::{Chain, FAILED, SAFE, TOGETHER};
 
 /// Seconds of each state's step.
 #[derive(Debug, Clone, PartialEq)]
@@ -47,16 +44,7 @@ pub fn expected(chain: &Chain, reward: &Reward, steps: u32) -> f64 {
         .map(|state| left_over(chain, state))
         .collect();
     for _ in 0..steps {
-        worst
-            .par_iter_mut()
-            .with_min_len(TOGETHER)
-            .enumerate()
-            .for_each(|(set, worst)| {
-                let members = chain.members(set as u32).iter();
-                *worst = members
-                    .map(|state| value[*state as usize])
-                    .fold(0.0, f64::max);
-            });
+        chain.over_sets(&value, 0.0, f64::max, &mut worst);
         let worst = &worst;
         value[2..]
             .par_iter_mut()

@@ -14,10 +14,7 @@
 
 use rayon::prelude::*;
 
-use crate::chain::{Chain, FAILED};
-
-/// Sets and states in one piece of work.
-const TOGETHER: usize = 2048;
+use crate::chain::{Chain, FAILED, TOGETHER};
 
 /// The values of all states with this many steps to go, each a lower bound in \[0, 1\].
 pub fn values(chain: &Chain, steps: u32) -> Vec<f64> {
@@ -50,16 +47,7 @@ fn of_initial(chain: &Chain, value: &[f64]) -> f64 {
 
 /// One step: `worst` is for the sets' least values.
 fn step(chain: &Chain, worst: &mut [f64], value: &mut [f64]) {
-    worst
-        .par_iter_mut()
-        .with_min_len(TOGETHER)
-        .enumerate()
-        .for_each(|(set, worst)| {
-            let members = chain.members(set as u32).iter();
-            *worst = members
-                .map(|state| value[*state as usize])
-                .fold(1.0, f64::min);
-        });
+    chain.over_sets(value, 1.0, f64::min, worst);
     let worst = &*worst;
     // The first two states stay as they are.
     value[2..]

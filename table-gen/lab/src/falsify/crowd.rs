@@ -14,6 +14,7 @@ use firmware::table::TableView;
 use firmware::units::{MICRO, STATES, State};
 
 use super::adversaries::Random;
+use model::discrepancy::arc_discrepancy;
 
 /// Parts of a tick.
 pub const PARTS: usize = 10;
@@ -54,24 +55,13 @@ pub struct CrowdTimes {
 
 /// Fewest chargers with consecutive serial numbers, from which on to `most` every crowd's levels
 /// are as even as a spec assumes (`uncertainty.level_discrepancy`); at least `least`.
-///
-/// With F the share of offsets below x, an arc holds more or less than its length by a difference
-/// of two values of F - x, which are extreme at the offsets.
 pub fn fewest_members(assumed: Option<f64>, least: u64, most: u64) -> u64 {
     let Some(assumed) = assumed else {
         return least;
     };
     let uneven = |number: &u64| {
-        let mut places: Vec<f64> = (0..*number as u32)
-            .map(|serial| f64::from(LevelOffset::of_serial(serial).units()) / 2f64.powi(32))
-            .collect();
-        places.sort_by(f64::total_cmp);
-        let below = |k: usize| k as f64 / *number as f64;
-        let ends = places.iter().enumerate();
-        let (low, high) = ends.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), (k, x)| {
-            (low.min(below(k) - x), high.max(below(k + 1) - x))
-        });
-        high - low > assumed
+        let offsets = (0..*number as u32).map(|serial| LevelOffset::of_serial(serial).units());
+        arc_discrepancy(offsets) > assumed
     };
     (least..=most).rev().find(uneven).map_or(least, |n| n + 1)
 }

@@ -3,6 +3,7 @@
 use std::collections::HashMap;
 
 use super::{Ends, Key};
+use crate::chain::{Branch, Chain, FAILED, SAFE};
 
 /// Sets of nodes by their numbers.
 pub(super) enum NodeSet {
@@ -27,6 +28,57 @@ impl Known {
             self.keys.push(key);
             next
         })
+    }
+
+    /// The chain of what is known. `first` has where the states (groups) of each node begin, `rows`
+    /// where the branches of each state begin; of the nodes from `expanded` on, `beyond` stands for
+    /// each. Sets whose nodes decide nothing that counts, and an event of which nothing is decided
+    /// in the horizon, are safe here.
+    pub(super) fn chain(
+        &self,
+        initial: Vec<u32>,
+        rows: Vec<usize>,
+        branches: Vec<Branch>,
+        first: &[usize],
+        expanded: usize,
+        beyond: u32,
+    ) -> Chain {
+        let mut chain = Chain {
+            initial: Vec::new(),
+            rows,
+            branches,
+            set_rows: vec![0],
+            members: Vec::new(),
+        };
+        for set in &self.sets {
+            match set {
+                NodeSet::Failed => chain.members.push(FAILED),
+                NodeSet::Nodes(nodes) => {
+                    for node in nodes {
+                        let node = *node as usize;
+                        match (first.get(node), first.get(node + 1)) {
+                            (Some(from), Some(to)) if node < expanded => {
+                                chain.members.extend(*from as u32..*to as u32);
+                            }
+                            _ => chain.members.push(beyond),
+                        }
+                    }
+                }
+            }
+            if chain.set_rows.last() == Some(&chain.members.len()) {
+                chain.members.push(SAFE);
+            }
+            chain.set_rows.push(chain.members.len());
+        }
+        for set in initial {
+            chain.initial.extend(chain.members(set).to_vec());
+        }
+        if chain.initial.is_empty() {
+            chain.initial.push(SAFE);
+        }
+        chain.initial.sort_unstable();
+        chain.initial.dedup();
+        chain
     }
 
     /// The number of a set; its nodes become known.

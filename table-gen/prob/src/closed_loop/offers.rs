@@ -13,9 +13,9 @@ use firmware::table::Law;
 use firmware::units::{STATES, State};
 use rayon::prelude::*;
 
-use super::known::{Known, NodeSet};
+use super::known::Known;
 use super::{Branches, ClosedLoopError, Ends, Key, Loop, Settings};
-use crate::chain::{Branch, Chain, FAILED, SAFE};
+use crate::chain::{Branch, SAFE};
 use crate::choices::Choices;
 
 /// Nodes that are expanded between two looks at the clock.
@@ -182,42 +182,7 @@ impl Loop<'_> {
         } else {
             SAFE
         };
-        let mut chain = Chain {
-            initial: Vec::new(),
-            rows,
-            branches,
-            set_rows: vec![0],
-            members: Vec::new(),
-        };
-        for set in &known.sets {
-            match set {
-                NodeSet::Failed => chain.members.push(FAILED),
-                NodeSet::Nodes(nodes) => {
-                    for node in nodes {
-                        let node = *node as usize;
-                        match (first.get(node), first.get(node + 1)) {
-                            (Some(from), Some(to)) if node < expanded => {
-                                chain.members.extend(*from as u32..*to as u32);
-                            }
-                            _ => chain.members.push(beyond),
-                        }
-                    }
-                }
-            }
-            // A set whose nodes decide nothing that counts is followed elsewhere, and safe here.
-            if chain.set_rows.last() == Some(&chain.members.len()) {
-                chain.members.push(SAFE);
-            }
-            chain.set_rows.push(chain.members.len());
-        }
-        for set in initial {
-            chain.initial.extend(chain.members(set).to_vec());
-        }
-        if chain.initial.is_empty() {
-            chain.initial.push(SAFE);
-        }
-        chain.initial.sort_unstable();
-        chain.initial.dedup();
+        let chain = known.chain(initial, rows, branches, &first, expanded, beyond);
         Ok(Offered {
             choices: Choices { chain, groups },
             places,

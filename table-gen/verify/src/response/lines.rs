@@ -287,6 +287,7 @@ fn supporting_slope(corners: &[(f64, f64)], side: Side, at: f64) -> f64 {
 mod tests {
     use super::*;
     use crate::response::testing::{assumed, law};
+    use model::discrepancy::arc_discrepancy;
     use proptest::prelude::*;
 
     proptest! {
@@ -324,25 +325,6 @@ mod tests {
         }
     }
 
-    /// Largest difference between an arc's length and the share of offsets on it, both ways of
-    /// closing its ends.
-    fn discrepancy(offsets: &[u32]) -> f64 {
-        let mut places: Vec<f64> = offsets
-            .iter()
-            .map(|o| f64::from(*o) / 2f64.powi(32))
-            .collect();
-        places.sort_by(f64::total_cmp);
-        let n = places.len() as f64;
-        // With F the share below x, an arc's excess is a difference of two values of F - x.
-        let (low, high) = places
-            .iter()
-            .enumerate()
-            .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), (k, x)| {
-                (low.min(k as f64 / n - x), high.max((k + 1) as f64 / n - x))
-            });
-        high - low
-    }
-
     proptest! {
         #![proptest_config(ProptestConfig::with_cases(200))]
 
@@ -371,7 +353,8 @@ mod tests {
                 smallest_change_ppm,
             };
             let serials: Vec<u32> = (0..chargers as u32).map(|n| first.wrapping_add(n)).collect();
-            let offsets: Vec<u32> = serials.iter().map(|n| n.wrapping_mul(0x9E37_79B9)).collect();
+            let offsets = serials.iter().map(|n| LevelOffset::of_serial(*n).units());
+            let uneven = arc_discrepancy(offsets);
             let mut state = seed | 1;
             let mut random = |most: u32| {
                 state ^= state << 13;
@@ -419,7 +402,7 @@ mod tests {
             };
             let assumed = Assumed {
                 participation: 0.0,
-                mean_step_share: (0.5 + discrepancy(&offsets)).min(1.0),
+                mean_step_share: (0.5 + uneven).min(1.0),
                 ..assumed()
             };
             let side = if below { Side::Below } else { Side::Above };
@@ -440,11 +423,10 @@ mod tests {
 
     /// Solved by hand: levels 0.1 apart, offsets 0, 1/4, 1/2 and 3/4 of that, no target above 0.3.
     /// The largest levels below 0.4 are 0.3, 0.325, 0.35 and 0.375, so the mean is at most 0.3375.
-    /// On an arc that just holds one offset there is 1/4 of the fleet more than its length says.
+    /// On an arc that just holds one offset there is 1/4 of the fleet more than its length says,
+    /// with which the bound is 0.375.
     #[test]
     fn four_chargers_by_hand() {
-        let offsets = [0, 1 << 30, 2 << 30, 3 << 30];
-        assert!((discrepancy(&offsets) - 0.25).abs() < 1e-12);
         let law = RealLaw {
             smallest_change: 0.1,
             rounding: 0.0,
