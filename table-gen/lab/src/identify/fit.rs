@@ -23,6 +23,11 @@ const MHZ: f64 = 1e3;
 const PROGRESS: f64 = 0.03;
 /// Readings that differ by less are equal \[Hz\]: far below any step of a record.
 const SAME_HZ: f64 = 1e-9;
+/// Readings within this time count as one \[s\]: a rounding's error may stay the same for that long
+/// though the readings differ.
+const ONE_ERROR_S: f64 = 1.0;
+/// Times that differ by less are equal \[s\].
+const SAME_S: f64 = 1e-6;
 /// Points that are kept of those that explain the record well enough.
 const KEPT: usize = 4000;
 
@@ -47,30 +52,38 @@ impl Data {
         pairs.map(|(reading, f)| MHZ * (reading - f)).collect()
     }
 
-    /// The same with each run of equal readings taken as one: the mean of its residuals. That is
-    /// what fits are judged by.
+    /// The same with readings whose errors are nearly one error taken as one: the mean of their
+    /// residuals. Those are the readings of a run of equal ones, and those within [`ONE_ERROR_S`].
+    /// That is what fits are judged by.
     ///
     /// A reading is f rounded, and so off by at most half a step. Where f moves by less than a step
     /// from one sample to the next, the errors of a run are nearly one error, which no number of
     /// samples averages away; counted as many, they would tell more than the record does: ten
     /// seconds of rest at ten samples a second would tell the rest to a tenth of what it is rounded
-    /// by. The mean of a run's errors is bounded by half a step as one reading's is, and the error
-    /// of another run is another one. Readings that noise moves have runs of one.
+    /// by. Where f moves by about a whole number of steps from sample to sample, the errors go
+    /// round slowly, and neighbours have nearly the same one though their readings differ. The mean
+    /// of some errors is bounded by half a step as one reading's is; how much less it is nobody
+    /// knows, so a mean counts as one reading does ([`Noise`](super::intervals::Noise) takes at
+    /// least the variance of one rounding). Samples a second apart that differ stand for themselves.
     pub fn misfits(&self, values: &Values) -> Vec<f64> {
         let residuals = self.residuals(values);
         let mut out: Vec<f64> = Vec::with_capacity(residuals.len());
         let mut length = 0.0;
         let mut before = f64::NAN;
-        for (reading, residual) in self.readings_hz.iter().zip(residuals) {
+        let mut begin_s = f64::NEG_INFINITY;
+        let samples = self.times_s.iter().zip(&self.readings_hz);
+        for ((time, reading), residual) in samples.zip(residuals) {
+            let near = time - begin_s < ONE_ERROR_S - SAME_S;
             match out.last_mut() {
                 // The readings are decimal numbers: a run repeats one of them, bit for bit, but for
                 // the subtraction of the nominal frequency.
-                Some(mean) if (reading - before).abs() < SAME_HZ => {
+                Some(mean) if near || (reading - before).abs() < SAME_HZ => {
                     length += 1.0;
                     *mean += (residual - *mean) / length;
                 }
                 _ => {
                     length = 1.0;
+                    begin_s = *time;
                     out.push(residual);
                 }
             }
@@ -315,22 +328,42 @@ mod tests {
     use super::super::parameters::{ONSET, PARAMETERS, REST};
     use super::*;
 
-    /// At rest, with readings of 1, 1, 1, 2 and 1 mHz: three runs; residuals are the readings.
-    #[test]
-    fn equal_neighbours_are_one_reading() {
+    /// At rest; residuals are the readings.
+    fn at_rest(step_s: f64, readings_mhz: &[f64]) -> (Data, Values) {
         let data = Data {
-            times_s: vec![0.0, 1.0, 2.0, 3.0, 4.0],
-            readings_hz: [0.001, 0.001, 0.001, 0.002, 0.001].to_vec(),
+            times_s: (0..readings_mhz.len()).map(|k| k as f64 * step_s).collect(),
+            readings_hz: readings_mhz.iter().map(|reading| 1e-3 * reading).collect(),
             stages: Vec::new(),
             ranges: PARAMETERS,
         };
         let mut values = PARAMETERS.map(|p| p.value(0.5));
-        (values[ONSET], values[REST]) = (10.0, 0.0);
-        assert_eq!(data.residuals(&values).len(), 5);
-        let misfits = data.misfits(&values);
-        assert_eq!(misfits.len(), 3);
-        for (found, expected) in misfits.iter().zip([1.0, 2.0, 1.0]) {
-            assert!((found - expected).abs() < 1e-12, "{misfits:?}");
+        (values[ONSET], values[REST]) = (100.0, 0.0);
+        assert_eq!(data.residuals(&values).len(), readings_mhz.len());
+        (data, values)
+    }
+
+    fn is(found: &[f64], expected: &[f64]) {
+        assert_eq!(found.len(), expected.len(), "{found:?}");
+        for (found, expected) in found.iter().zip(expected) {
+            assert!((found - expected).abs() < 1e-12, "{found} {expected}");
         }
+    }
+
+    /// Readings of 1, 1, 1, 2 and 1 mHz, a second apart: three runs.
+    #[test]
+    fn equal_neighbours_are_one_reading() {
+        let (data, values) = at_rest(1.0, &[1.0, 1.0, 1.0, 2.0, 1.0]);
+        is(&data.misfits(&values), &[1.0, 2.0, 1.0]);
+    }
+
+    /// Four samples a second: 1, 2, 3, 4 are one; so are the next three and what equals the last
+    /// of them, however long; what is left is the third.
+    #[test]
+    fn a_second_is_one_reading() {
+        let (data, values) = at_rest(
+            0.25,
+            &[1.0, 2.0, 3.0, 4.0, 5.0, 5.0, 5.0, 9.0, 9.0, 9.0, 2.0],
+        );
+        is(&data.misfits(&values), &[2.5, 42.0 / 6.0, 2.0]);
     }
 }

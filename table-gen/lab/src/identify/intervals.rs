@@ -8,9 +8,9 @@
 //! parameter that others can stand in for is as wide as they let it be.
 //!
 //! Errors of a record are not independent: readings are rounded, demand wanders. A run of equal
-//! readings counts as one ([`Data::misfits`]). σ² is that of the residuals, at least that of
-//! rounding to 1 mHz, times (1 + ρ)/(1 - ρ) with ρ the correlation of neighbouring residuals: as if
-//! only so many samples were independent.
+//! readings counts as one, and so do those within a second ([`Data::misfits`]). σ² is that of the
+//! residuals, at least that of rounding to 1 mHz, times (1 + ρ)/(1 - ρ) with ρ the correlation of
+//! neighbouring residuals: as if only so many samples were independent.
 //!
 //! Ends are outward: where the profile crosses the limit between two places, the farther one.
 

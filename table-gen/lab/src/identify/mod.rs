@@ -71,7 +71,7 @@ pub enum IdentifyError {
     Excerpt(#[from] ExcerptError),
     /// Too few samples.
     #[error(
-        "{found} samples count, equal neighbours as one; allowed: at least {least} for this many parameters"
+        "{found} samples count, equal neighbours and those within a second as one; allowed: at least {least} for this many parameters"
     )]
     Samples {
         /// Found.
