@@ -1,6 +1,6 @@
 //! No two files use each other, not even over others: what a file needs can be read below it.
 //!
-//! Read off the `use` lines and paths of the host packages with syn. What is compiled for tests
+//! Read off the `use` lines and paths of every package of the workspace with syn. What is compiled for tests
 //! alone does not count, and a name that a file only hands on counts as its owner's.
 #![allow(clippy::expect_used, reason = "a test that cannot go on fails")]
 
@@ -10,14 +10,22 @@ use std::path::{Path, PathBuf};
 use syn::visit::{self, Visit};
 use syn::{Attribute, ItemMod, ItemUse, UseTree, Visibility};
 
-/// The packages whose files are looked at, by the folder of their sources.
-const SOURCES: [&str; 5] = [
-    "table-gen/model/src",
-    "table-gen/synth/src",
-    "table-gen/verify/src",
-    "table-gen/lab/src",
-    "table-gen/src",
-];
+/// The sources of every package of the workspace, as its manifest lists them.
+fn sources() -> Vec<String> {
+    let manifest = std::fs::read_to_string(tests::root().join("Cargo.toml"));
+    let manifest: toml::Table = manifest
+        .expect("the manifest can be read")
+        .parse()
+        .expect("the manifest is TOML");
+    let members = manifest["workspace"]["members"].as_array();
+    let members = members.expect("members are a list").iter();
+    let names = members.map(|member| member.as_str().expect("a member is a path"));
+    let sources: Vec<String> = names.map(|name| format!("{name}/src")).collect();
+    for source in &sources {
+        assert!(tests::root().join(source).is_dir(), "{source}");
+    }
+    sources
+}
 
 /// A module's path below its crate; empty for the crate's root.
 type Module = Vec<String>;
@@ -103,7 +111,9 @@ fn files(folder: &Path, module: &Module, found: &mut BTreeMap<Module, PathBuf>) 
         if path.is_dir() {
             files(&path, &inner, found);
         } else if path.extension().is_some_and(|end| end == "rs") {
-            let is_folder = matches!(&*stem, "lib" | "main" | "mod");
+            // A program beside a library is a crate of its own.
+            let beside = stem == "main" && folder.join("lib.rs").exists();
+            let is_folder = matches!(&*stem, "lib" | "main" | "mod") && !beside;
             found.insert(if is_folder { module.clone() } else { inner }, path);
         }
     }
@@ -198,11 +208,29 @@ fn reached<'g>(
     reached
 }
 
+/// Files of the firmware that need each other still: a mended circle, too, changes this list.
+const KNOWN: [&str; 12] = [
+    "firmware/src: board -> frequency::zero_crossing",
+    "firmware/src: frequency::zero_crossing -> board",
+    "firmware/src: observer -> observer::loss",
+    "firmware/src: observer::loss -> observer",
+    "firmware/src: table -> table::domain, table::header, table::law, table::response_part",
+    "firmware/src: table::dense -> table, table::law",
+    "firmware/src: table::domain -> table, table::tree",
+    "firmware/src: table::header -> table::hypotheses",
+    "firmware/src: table::hypotheses -> table",
+    "firmware/src: table::law -> table, table::dense, table::domain, table::header, table::tree",
+    "firmware/src: table::response_part -> table",
+    "firmware/src: table::tree -> table, table::law",
+];
+
 #[test]
 fn no_file_reaches_itself() {
     let mut circles = Vec::new();
-    for source in SOURCES {
-        let graph = graph(&tests::root().join(source));
+    let sources = sources();
+    assert!(sources.iter().any(|source| source == "table-gen/prob/src"));
+    for source in sources {
+        let graph = graph(&tests::root().join(&source));
         for (module, uses) in &graph {
             if !reached(&graph, module).contains(module) {
                 continue;
@@ -218,7 +246,7 @@ fn no_file_reaches_itself() {
             ));
         }
     }
-    assert!(circles.is_empty(), "{}", circles.join("\n"));
+    assert_eq!(circles, KNOWN, "{}", circles.join("\n"));
 }
 
 #[test]

@@ -6,47 +6,31 @@ use ::prob::closed_loop::{self, Settings};
 use ::prob::maximise::{self, Place};
 use ::prob::participation::Participation;
 use ::prob::value;
-use firmware::table::{Law, TableView};
+use firmware::table::Law;
 use firmware::units::STATES;
 use model::spec::Spec;
 use serde::Serialize;
 use synth::chosen::Chosen;
 use synth::problem::Problem;
 
+use super::chain_args::{ChainArgs, view};
 use super::files::write_one;
-use super::prob::{BIN_GW, HORIZON_S, NODES_MAX};
-use super::{Failure, Overrides, output, progress};
+use super::first_levels::{Asked, First};
+use super::{Failure, output, progress};
 
 /// Arguments of `maximise`.
 #[derive(Debug, clap::Args)]
 pub(super) struct MaximiseArgs {
-    /// The table whose levels are the first; it may be one of another spec on the same cells
-    #[arg(value_name = "TABLE")]
-    table: PathBuf,
-    /// Name of a shipped spec, or path of a TOML file
-    #[arg(long, value_name = "SPEC")]
-    spec: String,
     #[command(flatten)]
-    overrides: Overrides,
-    #[command(flatten)]
-    output: super::OutputArgs,
-    /// Error of the delivered participation, drawn anew each period, as `prob` takes it; default:
-    /// chance.participation
-    #[arg(long, value_name = "KIND")]
-    participation: Option<Participation>,
-    /// Time over which the promise is bounded; default: the spec's horizon, or 120 [s]
-    #[arg(long, value_name = "S")]
-    horizon_s: Option<f64>,
-    /// Width of a bin of the fleet's power [GW]
-    #[arg(long, value_name = "GW", default_value_t = BIN_GW)]
-    bin_gw: f64,
-    /// Nodes after which a chain is followed no more; what is not followed counts as failed
-    #[arg(long, value_name = "N", default_value_t = NODES_MAX)]
-    nodes_max: usize,
+    chain: ChainArgs,
+    /// The first levels: `table`, those of TABLE, which may be one of another spec on the same
+    /// cells; a participation that every cell asks for; or `search`, the best of those in runs
+    #[arg(long, value_name = "WHAT", default_value = "table")]
+    first: First,
     /// Steps before a possible failure at which levels may change
     #[arg(long, value_name = "N", default_value_t = 2)]
     back: u32,
-    /// Most rounds of changes
+    /// Most rounds of changes; 0: the first levels are only bounded and written
     #[arg(long, value_name = "N", default_value_t = 4)]
     rounds: u32,
     /// The new table
@@ -72,7 +56,10 @@ struct MaximiseReport<'r> {
     spec: &'r str,
     participation: String,
     horizon_s: f64,
-    before: f64,
+    /// Bound of the levels of TABLE, where they are the first.
+    before: Option<f64>,
+    /// The participation that all first levels ask for, if they do.
+    first: Option<f64>,
     lower_bound: f64,
     states: usize,
     rounds: &'r [Round],
@@ -84,18 +71,25 @@ struct MaximiseReport<'r> {
 
 /// Runs the command.
 pub(super) fn run(args: &MaximiseArgs) -> Result<(), Failure> {
-    let spec = args.overrides.load(&args.spec)?;
+    let spec = args.chain.spec()?;
     let (kind, settings) = question(args, &spec)?;
     progress::catch_interrupts();
-    let bytes = std::fs::read(&args.table)
-        .map_err(|error| Failure::BadInput(format!("{}: {error}", args.table.display())))?;
+    let bytes = args.chain.bytes()?;
     let problem = Problem::new(&spec).map_err(Failure::bad)?;
-    let first = Chosen::of(&problem, &view(&bytes)?).map_err(Failure::bad)?;
+    let asked = Asked {
+        problem: &problem,
+        spec: &spec,
+        kind,
+        settings,
+    };
+    let table = view(&bytes)?;
+    let (first, even) = args.first.levels(&asked, &table)?;
+    let own = Chosen::of(&problem, &table).map_err(Failure::bad)?;
     let go_on = |_: usize, _: usize| !progress::interrupted();
     let mut chosen = first.clone();
     let mut best: Option<(f64, Chosen, Vec<Place>)> = None;
     let mut rounds = Vec::new();
-    let mut before = 0.0;
+    let mut before = None;
     for round in 0..=args.rounds {
         let dense = chosen.dense(&problem).map_err(Failure::bad)?;
         let table = view(&dense)?;
@@ -106,8 +100,8 @@ pub(super) fn run(args: &MaximiseArgs) -> Result<(), Failure> {
             closed_loop::ClosedLoopError::Interrupted => Failure::No(error.to_string()),
             _ => Failure::bad(error),
         })?;
-        if round == 0 {
-            before = found.before;
+        if round == 0 && args.first == First::Table {
+            before = Some(found.before);
         }
         if best
             .as_ref()
@@ -131,9 +125,10 @@ pub(super) fn run(args: &MaximiseArgs) -> Result<(), Failure> {
             chosen.set(&problem, law, cell, change.level);
         }
     }
-    let Some((bound, chosen, asked)) = best.filter(|(bound, ..)| *bound > before) else {
+    let known = before.unwrap_or(0.0);
+    let Some((bound, chosen, asked)) = best.filter(|(bound, ..)| *bound > known) else {
         return Err(Failure::No(format!(
-            "no other levels with a larger bound than {before:.9} were found; --back and --rounds look farther, a smaller --bin-gw leaves the adversary less"
+            "no other levels with a larger bound than {known:.9} were found; --back and --rounds look farther, a smaller --bin-gw leaves the adversary less"
         )));
     };
     let asked: Vec<(Law, [u16; STATES])> =
@@ -152,47 +147,33 @@ pub(super) fn run(args: &MaximiseArgs) -> Result<(), Failure> {
         participation: kind.to_string(),
         horizon_s: settings.horizon_s,
         before,
+        first: even,
         lower_bound,
         states: built.chain.states(),
         rounds: &rounds,
-        changed_cells: chosen.differences(&first),
+        changed_cells: chosen.differences(&own),
         asked_cells: asked.len(),
         table_bytes: small.len(),
         table: args.out.display().to_string(),
     };
-    if args.output.json {
+    if args.chain.output.json {
         return output::json(&report);
     }
     print(&report, bound);
     Ok(())
 }
 
-fn view(bytes: &[u8]) -> Result<TableView<'_>, Failure> {
-    TableView::parse(bytes)
-        .map_err(|error| Failure::BadInput(format!("the firmware rejects the table: {error:?}")))
-}
-
 /// How the participation is drawn, and how finely the chain is built.
 fn question(args: &MaximiseArgs, spec: &Spec) -> Result<(Participation, Settings), Failure> {
-    let Some(kind) = args.participation.or(spec.chance.drawn()) else {
+    let Some(kind) = args.chain.drawn(spec) else {
         return Err(Failure::BadInput(
             "--participation or the key chance.participation is needed: exact is one".to_owned(),
         ));
     };
-    if args.rounds == 0 || args.rounds > 100 || args.back > 100 {
-        return Err(Failure::BadInput(
-            "--rounds: 1 to 100, --back: 0 to 100".to_owned(),
-        ));
+    if args.rounds > 100 || args.back > 100 {
+        return Err(Failure::BadInput("--rounds and 0 to 100".to_owned()));
     }
-    let horizon_s = args
-        .horizon_s
-        .or(spec.requirements.horizon_s)
-        .unwrap_or(HORIZON_S);
-    let settings = Settings {
-        bin_gw: args.bin_gw,
-        nodes_max: args.nodes_max,
-        horizon_s,
-    };
+    let settings = args.chain.settings(spec)?;
     Ok((kind, settings))
 }
 
@@ -217,12 +198,18 @@ fn print(report: &MaximiseReport<'_>, bound: f64) {
         ]);
     }
     output::line(table);
+    if let Some(u) = report.first {
+        output::line(format_args!("first levels: {u} in every cell"));
+    }
+    let before = report
+        .before
+        .map_or(String::new(), |before| format!(", before {before:.9}"));
     output::line(format_args!(
-        "{}: P(psi over {} s) >= {:.9}, before {:.9}; {} cells have another level, {} are asked for",
+        "{}: P(psi over {} s) >= {:.9}{}; {} cells have another level, {} are asked for",
         report.spec,
         report.horizon_s,
         report.lower_bound,
-        report.before,
+        before,
         output::grouped(report.changed_cells),
         output::grouped(report.asked_cells)
     ));

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use ::prob::analysis::{self, AnalysisError, Answer, Question};
-use ::prob::closed_loop::{ClosedLoopError, Settings};
+use ::prob::closed_loop::ClosedLoopError;
 use ::prob::export;
 use ::prob::loss::Losses;
 use ::prob::participation::Participation;
@@ -14,37 +14,17 @@ use lab::report::section::Section;
 use serde::Serialize;
 use verify::VerifyError;
 
+use super::chain_args::{self, ChainArgs, view, within};
 use super::files::write_one;
 use super::shares::Job;
-use super::{Failure, Overrides, output, prob_figure, progress};
+use super::{Failure, output, prob_figure, progress};
 use model::spec::Spec;
-
-/// Time over which the promise is bounded where the spec has no horizon \[s\].
-pub(super) const HORIZON_S: f64 = 120.0;
-
-/// Width of a bin of the fleet's power [GW].
-pub(super) const BIN_GW: f64 = 0.0025;
-/// Nodes after which a chain is followed no more.
-pub(super) const NODES_MAX: usize = 500_000;
 
 /// Arguments of `prob`.
 #[derive(Debug, clap::Args)]
 pub(super) struct ProbArgs {
-    /// The table
-    #[arg(value_name = "TABLE")]
-    table: PathBuf,
-    /// Name of a shipped spec, or path of a TOML file
-    #[arg(long, value_name = "SPEC")]
-    spec: String,
     #[command(flatten)]
-    overrides: Overrides,
-    #[command(flatten)]
-    output: super::OutputArgs,
-    /// Error of the delivered participation, drawn anew each period: exact, uniform:BOUND,
-    /// gaussian:SIGMA[,DEVIATIONS], truncated:SIGMA,BOUND or bernoulli:CHARGERS; default:
-    /// chance.participation, or as the spec bounds it, with certainty
-    #[arg(long, value_name = "KIND")]
-    participation: Option<Participation>,
+    chain: ChainArgs,
     /// A response: time from one draw to the next [s]; default: chance.draw_interval_s, or the
     /// period
     #[arg(long, value_name = "S")]
@@ -60,15 +40,6 @@ pub(super) struct ProbArgs {
     /// default: chance.noise_hz, or none
     #[arg(long, value_name = "HZ")]
     noise_hz: Option<f64>,
-    /// Time over which the promise is bounded; default: the spec's horizon, or 120 [s]
-    #[arg(long, value_name = "S")]
-    horizon_s: Option<f64>,
-    /// Width of a bin of the fleet's power [GW]
-    #[arg(long, value_name = "GW", default_value_t = BIN_GW)]
-    bin_gw: f64,
-    /// Nodes after which a chain is followed no more; what is not followed counts as failed
-    #[arg(long, value_name = "N", default_value_t = NODES_MAX)]
-    nodes_max: usize,
     /// Write the chain in Storm's format (laws by games, with a participation; exact is one)
     #[arg(long, value_name = "FILE")]
     drn: Option<PathBuf>,
@@ -96,13 +67,11 @@ struct ProbReport<'r> {
 
 /// Runs the command.
 pub(super) fn run(args: &ProbArgs) -> Result<(), Failure> {
-    let spec = args.overrides.load(&args.spec)?;
+    let spec = args.chain.spec()?;
     let question = question(args, &spec)?;
     progress::catch_interrupts();
-    let bytes = std::fs::read(&args.table)
-        .map_err(|error| Failure::BadInput(format!("{}: {error}", args.table.display())))?;
-    let table = TableView::parse(&bytes)
-        .map_err(|error| Failure::BadInput(format!("the firmware rejects the table: {error:?}")))?;
+    let bytes = args.chain.bytes()?;
+    let table = view(&bytes)?;
     let bar = progress::share("prob");
     let job = Job::join();
     let go_on = |done| {
@@ -128,7 +97,7 @@ pub(super) fn run(args: &ProbArgs) -> Result<(), Failure> {
         write_one(path, chart::with_style(&drawn).as_bytes())?;
     }
     let simulated = simulated(args, &spec, &table, &question)?;
-    if args.output.json {
+    if args.chain.output.json {
         return output::json(&ProbReport {
             spec: &spec.name,
             answer: &answer,
@@ -141,18 +110,6 @@ pub(super) fn run(args: &ProbArgs) -> Result<(), Failure> {
 
 /// The question of the options.
 fn question(args: &ProbArgs, spec: &Spec) -> Result<Question, Failure> {
-    let within = |name: &str, value: f64, [low, high]: [f64; 2]| {
-        if value > low && value <= high {
-            return Ok(value);
-        }
-        Err(Failure::BadInput(format!(
-            "{name} = {value}: above {low} and at most {high} is allowed"
-        )))
-    };
-    let horizon_s = args
-        .horizon_s
-        .or(spec.requirements.horizon_s)
-        .unwrap_or(HORIZON_S);
     let chance = &spec.chance;
     let interval = args
         .draw_interval_s
@@ -174,16 +131,12 @@ fn question(args: &ProbArgs, spec: &Spec) -> Result<Question, Failure> {
         (None, None) => None,
     };
     Ok(Question {
-        participation: args.participation.or(chance.drawn()),
+        participation: args.chain.drawn(spec),
         draw_interval_s: within("--draw-interval-s", interval, [0.0, 3600.0])?,
         losses,
         noise_hz,
         errors: args.errors.clone(),
-        settings: Settings {
-            bin_gw: within("--bin-gw", args.bin_gw, [0.0, 1.0])?,
-            nodes_max: args.nodes_max,
-            horizon_s: within("--horizon-s", horizon_s, [0.0, 3600.0])?,
-        },
+        settings: args.chain.settings(spec)?,
     })
 }
 
@@ -208,11 +161,7 @@ pub(super) fn section(
         losses,
         noise_hz: chance.noise_hz,
         errors: errors.to_vec(),
-        settings: Settings {
-            bin_gw: BIN_GW,
-            nodes_max: NODES_MAX,
-            horizon_s: spec.requirements.horizon_s.unwrap_or(HORIZON_S),
-        },
+        settings: chain_args::plain(spec),
     };
     let bar = progress::share("prob");
     let bands = analysis::bands_of(spec, &question);

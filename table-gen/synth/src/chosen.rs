@@ -76,6 +76,13 @@ impl Chosen {
         }
     }
 
+    /// Gives every cell of every law this level.
+    pub fn fill(&mut self, level: u8) {
+        for masks in self.masks.iter_mut().flatten() {
+            masks.fill(1 << level);
+        }
+    }
+
     /// Cells at which two of the same shape differ, over all laws.
     pub fn differences(&self, other: &Self) -> usize {
         let laws = self.masks.iter().zip(&other.masks);

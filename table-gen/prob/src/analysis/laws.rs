@@ -9,7 +9,8 @@
 use firmware::table::TableView;
 use model::spec::Spec;
 
-use super::{AnalysisError, Answer, Cut, Layer, Layers, Question, certain};
+use super::answer::{AnalysisError, Answer, Cut, Layer, Layers, Question};
+use super::certain;
 use crate::bands::BandProof;
 use crate::closed_loop::{self, ClosedLoop, ClosedLoopError};
 use crate::loss::{LossBand, Losses};

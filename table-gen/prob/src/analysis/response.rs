@@ -4,7 +4,7 @@
 use firmware::table::TableView;
 use model::spec::Spec;
 
-use super::{AnalysisError, Answer, Layer, Layers, Question};
+use super::answer::{AnalysisError, Answer, Layer, Layers, Question};
 use crate::bands::{self, Alone, BandProof};
 use crate::loss::{LossBand, Losses};
 use crate::participation::Drawn as _;

@@ -3,7 +3,7 @@
 use firmware::table::TableView;
 use model::spec::Spec;
 
-use super::ClosedLoopError;
+use super::error::ClosedLoopError;
 
 /// What the chain covers.
 pub(super) fn covered(table: &TableView<'_>, spec: &Spec) -> Result<(), ClosedLoopError> {

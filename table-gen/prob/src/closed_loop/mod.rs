@@ -29,6 +29,7 @@
 //! bound whatever comes after it. The chain stays a chain, and its bound a bound for every horizon.
 
 mod covered;
+mod error;
 mod event;
 mod expand;
 mod explore;
@@ -53,6 +54,7 @@ use crate::modes::Modes;
 pub use crate::modes::ModesError;
 use crate::participation::{Bin, Drawn, Participation};
 use crate::reward::Reward;
+pub use error::ClosedLoopError;
 pub(crate) use offers::Offered;
 pub use offers::Place;
 
@@ -68,35 +70,6 @@ pub struct Settings {
     pub nodes_max: usize,
     /// Time over which the claim is made \[s\].
     pub horizon_s: f64,
-}
-
-/// Why there is no chain.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub enum ClosedLoopError {
-    /// The plant does not contract.
-    #[error(transparent)]
-    Modes(#[from] ModesError),
-    /// A table or spec that is not covered.
-    #[error("{what}: not covered by the chain; {remedy}")]
-    Unsupported {
-        /// What.
-        what: String,
-        /// What is covered.
-        remedy: &'static str,
-    },
-    /// A setting that makes no sense.
-    #[error("{name} = {found}: allowed is {allowed}")]
-    Setting {
-        /// The setting.
-        name: &'static str,
-        /// What was found.
-        found: f64,
-        /// What is allowed.
-        allowed: &'static str,
-    },
-    /// It was ended from outside.
-    #[error("interrupted")]
-    Interrupted,
 }
 
 /// Why states failed: how many decided states fail whatever is drawn.

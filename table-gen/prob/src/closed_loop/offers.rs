@@ -34,8 +34,8 @@ pub struct Place {
 #[derive(Debug, Clone)]
 pub(crate) struct Offered {
     pub(crate) choices: Choices,
-    /// Of each group; nothing where no law decides.
-    pub(crate) places: Vec<Option<Place>>,
+    /// Of each group; none where no law decides.
+    pub(crate) places: Vec<Vec<Place>>,
     /// Of each state: the level that it stands for, at a place.
     pub(crate) levels: Vec<Option<u8>>,
     pub(crate) steps: u32,
@@ -43,9 +43,9 @@ pub(crate) struct Offered {
     pub(crate) unfollowed: usize,
 }
 
-/// A group of a node: its place, and its choices with their levels.
+/// A group of a node: its places, and its choices with their levels.
 struct Group {
-    place: Option<Place>,
+    places: Vec<Place>,
     choices: Vec<(Option<u8>, Branches)>,
 }
 
@@ -69,47 +69,62 @@ impl Loop<'_> {
     fn groups(&self, key: &Key, open: &HashSet<Place>) -> Vec<Group> {
         let ball = self.cover.ball(key.cell, key.left);
         let state = key.state();
-        let mut met: Vec<(Option<Place>, PhaseState, Decision)> = Vec::new();
+        // Open places, and the others by what they decide.
+        let mut offered: Vec<(Place, PhaseState)> = Vec::new();
+        let mut settled: Vec<(PhaseState, Decision, Vec<Place>)> = Vec::new();
         self.regions.each_region(&ball, &mut |measured| {
             let (next, decision) = state.step(self.table, measured);
             // The band was left: a part of the set that is still inside is followed elsewhere.
             if key.left && next == state {
                 return;
             }
-            let found = (self.place(next, measured), next, decision);
-            if !met.contains(&found) {
-                met.push(found);
+            let place = self.place(next, measured);
+            if let Some(place) = place.filter(|place| open.contains(place)) {
+                if !offered.contains(&(place, next)) {
+                    offered.push((place, next));
+                }
+                return;
+            }
+            let found = settled
+                .iter()
+                .position(|(known, decided, _)| (*known, *decided) == (next, decision));
+            let at = found.unwrap_or_else(|| {
+                settled.push((next, decision, Vec::new()));
+                settled.len() - 1
+            });
+            let places = &mut settled[at].2;
+            if let Some(place) = place.filter(|place| !places.contains(place)) {
+                places.push(place);
             }
         });
-        met.into_iter()
-            .map(|(place, next, decision)| {
-                let offered = place.filter(|place| open.contains(place));
-                let Some(Place { law, .. }) = offered else {
-                    let level = match (place, decision) {
-                        (Some(_), Decision::Level(level)) => Some(level),
-                        _ => None,
-                    };
-                    let decided = self.decided(key, &ball, next, decision);
-                    let choices = vec![(level, decided.branches)];
-                    return Group { place, choices };
+        let of_settled = settled.into_iter().map(|(next, decision, places)| {
+            let level = match decision {
+                Decision::Level(level) if !places.is_empty() => Some(level),
+                _ => None,
+            };
+            let choices = vec![(level, self.decided(key, &ball, next, decision).branches)];
+            Group { places, choices }
+        });
+        let of_offered = offered.into_iter().map(|(place, next)| {
+            let phase = match place.law {
+                Law::C2 => Phase::C2,
+                _ => Phase::C1,
+            };
+            let choices = (0..self.table.header().levels).map(|level| {
+                let next = PhaseState {
+                    phase,
+                    level,
+                    ticks_left: next.ticks_left,
                 };
-                let phase = match law {
-                    Law::C2 => Phase::C2,
-                    _ => Phase::C1,
-                };
-                let choices = (0..self.table.header().levels).map(|level| {
-                    let next = PhaseState {
-                        phase,
-                        level,
-                        ticks_left: next.ticks_left,
-                    };
-                    let decided = self.decided(key, &ball, next, Decision::Level(level));
-                    (Some(level), decided.branches)
-                });
-                let choices = choices.collect();
-                Group { place, choices }
-            })
-            .collect()
+                let decided = self.decided(key, &ball, next, Decision::Level(level));
+                (Some(level), decided.branches)
+            });
+            Group {
+                places: vec![place],
+                choices: choices.collect(),
+            }
+        });
+        of_settled.chain(of_offered).collect()
     }
 
     /// Expands all nodes that are reached under any choice.
@@ -125,7 +140,7 @@ impl Loop<'_> {
         let initial: Vec<u32> = start.iter().map(|ends| known.set(ends)).collect();
         let (mut rows, mut branches) = (vec![0usize; 3], Vec::new());
         // FAILED and SAFE have no places and no levels.
-        let (mut groups, mut places) = (vec![0usize, 1, 2], vec![None; 2]);
+        let (mut groups, mut places) = (vec![0usize, 1, 2], vec![Vec::new(); 2]);
         let mut levels = vec![None; 2];
         // Where the groups of each node begin.
         let mut first = Vec::new();
@@ -152,7 +167,7 @@ impl Loop<'_> {
             for node in part {
                 first.push(places.len());
                 for group in node {
-                    places.push(group.place);
+                    places.push(group.places);
                     for (level, ends) in group.choices {
                         levels.push(level);
                         for (probability, ends) in ends {
@@ -176,7 +191,7 @@ impl Loop<'_> {
             branches.push(Branch { probability, set });
             rows.push(branches.len());
             groups.push(rows.len() - 1);
-            places.push(None);
+            places.push(Vec::new());
             levels.push(None);
             (places.len() - 1) as u32
         } else {

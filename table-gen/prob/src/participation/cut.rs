@@ -2,7 +2,7 @@
 
 use model::interval::Interval;
 
-use super::Bin;
+use super::bin::Bin;
 
 /// Most pieces into which a distribution is cut.
 const BINS_MAX: f64 = 4000.0;

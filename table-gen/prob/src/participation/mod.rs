@@ -3,6 +3,7 @@
 //! A bin is an interval of the delivered participation u' and a lower bound of the probability that
 //! u' falls into it. Bins cover what counts; what they leave over counts as failure.
 
+mod bin;
 mod cut;
 
 use model::independence::Crowd;
@@ -10,16 +11,8 @@ use model::interval::Interval;
 pub use model::participation::{Participation, ParticipationError, TAIL};
 
 use crate::{normal, union};
+pub use bin::Bin;
 use cut::{coins, relative};
-
-/// A piece of the distribution.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Bin {
-    /// Lower bound of the probability.
-    pub probability: f64,
-    /// The delivered participation, within \[0, 1\].
-    pub delivered: Interval,
-}
 
 /// What a bound asks of a distribution.
 pub trait Drawn {

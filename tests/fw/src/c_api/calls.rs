@@ -10,7 +10,7 @@ use holdfast::numbers::{Reading, Status};
 use holdfast::records::{CapturesConfig, Config, Input, Output};
 use holdfast::settings;
 
-use super::CApiError;
+use super::error::CApiError;
 
 const END: u32 = 0;
 const START: u32 = 1;

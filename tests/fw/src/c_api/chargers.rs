@@ -12,8 +12,8 @@ use model::propagator::Propagator;
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 
-use super::CApiError;
 use super::calls::Recording;
+use super::error::CApiError;
 use crate::pil::mains::MainsModel;
 use crate::pil::run::plant;
 use crate::pil::scenario::{self, Fault, Scenario};

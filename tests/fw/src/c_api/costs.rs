@@ -6,8 +6,8 @@ use std::path::Path;
 
 use super::calls::Recording;
 use super::chargers::{self, Tally};
+use super::error::{CApiError, io_error};
 use super::program::{self, CORTEX_M0, CORTEX_M4, Place};
-use super::{CApiError, io_error};
 use crate::costs::{Figures, compiler, count};
 use crate::images::Elf;
 

@@ -4,7 +4,7 @@
 use std::path::PathBuf;
 use std::process::{Command, Stdio};
 
-use super::{CApiError, io_error};
+use super::error::{CApiError, io_error};
 use crate::root;
 
 /// Cores that the library is built for, beside the host.

@@ -13,54 +13,23 @@
 pub mod calls;
 pub mod chargers;
 pub mod costs;
+mod error;
 pub mod library;
 pub mod package;
 pub mod program;
 
 use std::fs;
-use std::io;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use sha2::Digest;
 
-use crate::images::ImageError;
 use crate::root;
 use calls::Recording;
 use chargers::Tally;
+pub use error::CApiError;
+use error::io_error;
 use program::{CORTEX_M0, CORTEX_M4, HOST, Place};
-
-/// Why the C interface was not built, run or measured.
-#[derive(Debug, thiserror::Error)]
-pub enum CApiError {
-    /// A file or a program.
-    #[error("{what}: {source}")]
-    Io {
-        /// What was tried.
-        what: String,
-        /// Why it failed.
-        source: io::Error,
-    },
-    /// A program said no; its messages are above or in the text.
-    #[error("{0}")]
-    Failed(String),
-    /// An ELF file.
-    #[error(transparent)]
-    Image(#[from] ImageError),
-    /// The C program's answers are not the host's.
-    #[error("{0}")]
-    Differs(String),
-}
-
-fn io_error(what: impl Into<String>) -> impl FnOnce(io::Error) -> CApiError {
-    let what = what.into();
-    |source| CApiError::Io { what, source }
-}
-
-/// The package's folder.
-fn sources() -> PathBuf {
-    root().join("firmware/c-api")
-}
 
 /// Tables of the C programs: by games, with commands that act late, responses, both directions.
 pub const TABLES: [&str; 6] = [

@@ -5,9 +5,9 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
+use super::error::{CApiError, io_error, sources};
 use super::library::FILE;
 use super::program::run;
-use super::{CApiError, io_error, sources};
 use crate::root;
 
 /// Files of the package's folder, from its sources to their places.

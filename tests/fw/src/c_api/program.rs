@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
 use super::calls::{FACTS, Recording};
-use super::{CApiError, io_error, sources};
+use super::error::{CApiError, io_error, sources};
 use crate::pil::qemu::ICOUNT_SHIFT;
 
 /// Compiler of the Arm programs.
