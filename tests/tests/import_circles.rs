@@ -1,7 +1,8 @@
 //! No two files use each other, not even over others: what a file needs can be read below it.
 //!
-//! Read off the `use` lines and paths of every package of the workspace with syn. What is compiled for tests
-//! alone does not count, and a name that a file only hands on counts as its owner's.
+//! Read off the `use` lines and paths of every package of the workspace with syn. What is
+//! compiled for tests alone does not count, and a name that a file only hands on counts as its
+//! owner's.
 #![allow(clippy::expect_used, reason = "a test that cannot go on fails")]
 
 use std::collections::{BTreeMap, BTreeSet};
