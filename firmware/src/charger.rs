@@ -72,7 +72,9 @@ pub struct Charger<'t, S, D, W> {
     source: S,
     dispatch: D,
     watchdog: W,
-    config: ChargerConfig,
+    standing_faults: Faults,
+    hold_ticks: u16,
+    release_ppm: u32,
     tick_ms: u16,
     gate: Gate,
     filter: Filter,
@@ -127,25 +129,20 @@ impl<'t, S: FrequencySource, D: Dispatch, W: Watchdog> Charger<'t, S, D, W> {
         cause: ResetCause,
     ) -> Self {
         // A response needs no state estimate and knows no event.
-        let always_on = table.as_ref().is_ok_and(|view| view.response().is_some());
-        let (tick_ms, delay_ticks, droop, plant, event) = match &table {
+        let always_on = table.as_ref().is_ok_and(|view| view.working().always_on);
+        let (tick_ms, delay_ticks, droop, event) = match &table {
             Ok(view) => {
-                let header = view.header();
+                let header = view.working();
                 let event = (!always_on)
                     .then(|| EventWatch::new(config.event_end, header.outer, header.tick_ms));
-                (
-                    header.tick_ms,
-                    header.delay_ticks,
-                    header.droop,
-                    Some(header.plant),
-                    event,
-                )
+                (header.tick_ms, header.delay_ticks, header.droop, event)
             }
-            Err(_) => (TICK_MS_DEFAULT, 0, Droop::PAPER, None, None),
+            Err(_) => (TICK_MS_DEFAULT, 0, Droop::PAPER, None),
         };
+        let plant = table.as_ref().ok().map(TableView::plant);
         let observer = plant.and_then(|plant| {
             let coefficients = ObserverConfig::new(&plant, tick_ms).ok()?;
-            Some(Observer::at_rest(coefficients, &plant, 0))
+            Some(Observer::at_rest(coefficients, 0))
         });
         // A chain that is too fast for the tick makes a table by games as useless as a broken one.
         let unusable = observer.is_none() && table.is_ok() && !always_on;
@@ -160,7 +157,7 @@ impl<'t, S: FrequencySource, D: Dispatch, W: Watchdog> Charger<'t, S, D, W> {
         let misfits = match (&table, &config.installation) {
             (Ok(view), Some(installation)) => {
                 let meter = MeterFacts::of(&source);
-                misfits(view.header(), installation, meter, &filter)
+                misfits(&view.header(), installation, meter, &filter)
             }
             _ => Misfits::NONE,
         };
@@ -174,12 +171,14 @@ impl<'t, S: FrequencySource, D: Dispatch, W: Watchdog> Charger<'t, S, D, W> {
             source,
             dispatch,
             watchdog,
-            config,
+            standing_faults: config.standing_faults,
+            hold_ticks: config.hold_ticks,
+            release_ppm: config.release_ppm,
             tick_ms,
             gate,
             filter,
             observer,
-            control: ControlLoop::with_table(table).with_offset(config.level_offset),
+            control: ControlLoop::shifted(table, config.level_offset),
             droop,
             event,
             restarted: cause != ResetCause::PowerOn,
@@ -233,7 +232,7 @@ impl<'t, S: FrequencySource, D: Dispatch, W: Watchdog> Charger<'t, S, D, W> {
 
     /// One tick.
     pub fn tick(&mut self, now_ms: u32) -> Report {
-        let mut faults = self.config.standing_faults;
+        let mut faults = self.standing_faults;
         let due = self.ticks_due(now_ms, &mut faults);
         let reading = if faults.contains(Faults::CLOCK) {
             Err(FrequencyError::Clock)
@@ -322,8 +321,8 @@ impl<'t, S: FrequencySource, D: Dispatch, W: Watchdog> Charger<'t, S, D, W> {
         if let Some(event) = &mut self.event {
             event.reset();
         }
-        if let (Some(observer), Some(table)) = (&mut self.observer, self.control.table()) {
-            observer.restart(&table.header().plant, self.f_uhz);
+        if let Some(observer) = &mut self.observer {
+            observer.restart(self.f_uhz);
         }
     }
 
@@ -331,7 +330,7 @@ impl<'t, S: FrequencySource, D: Dispatch, W: Watchdog> Charger<'t, S, D, W> {
         let lost = self.lost_ticks;
         self.lost_ticks = 0;
         // The first reading: the best guess is a grid that has been there for long.
-        if lost > self.config.hold_ticks || self.sequence == 0 {
+        if lost > self.hold_ticks || self.sequence == 0 {
             self.f_uhz = f_uhz;
             self.start_again();
         }
@@ -439,7 +438,7 @@ impl<'t, S: FrequencySource, D: Dispatch, W: Watchdog> Charger<'t, S, D, W> {
     fn without_frequency(&mut self, due: u16) {
         self.lost_ticks = self.lost_ticks.saturating_add(due);
         self.control.miss(due);
-        if self.lost_ticks <= self.config.hold_ticks {
+        if self.lost_ticks <= self.hold_ticks {
             self.standing.mode = Mode::Hold;
             // The chain follows the last frequency; the loss estimate would see a kink that was not
             // there.
@@ -449,7 +448,7 @@ impl<'t, S: FrequencySource, D: Dispatch, W: Watchdog> Charger<'t, S, D, W> {
         } else {
             self.standing.mode = Mode::Safe;
             self.standing.phase = Phase::Fallback;
-            let release = self.config.release_ppm.saturating_mul(u32::from(due));
+            let release = self.release_ppm.saturating_mul(u32::from(due));
             let ppm = self.standing.participation.ppm().saturating_sub(release);
             self.standing.participation = Participation::from_ppm(ppm);
             // A response goes on from what was commanded last; other tables start again anyway.

@@ -20,7 +20,7 @@ use crate::droop::Droop;
 use crate::phase::{Decision, Phase, PhaseState};
 use crate::prediction::{DELAY_TICKS_MAX, History};
 use crate::response::{LevelOffset, Response};
-use crate::table::{Header, TableError, TableView};
+use crate::table::{TableError, TableView, Working};
 use crate::units::{Participation, State};
 
 /// Who decided the participation.
@@ -65,14 +65,21 @@ impl<'t> ControlLoop<'t> {
 
     /// The same for a table that was parsed already.
     pub fn with_table(table: Result<TableView<'t>, TableError>) -> Self {
+        Self::shifted(table, LevelOffset::NONE)
+    }
+
+    /// The same with this charger's levels of a response shifted. What [`ControlLoop::with_offset`]
+    /// does to a loop, without moving it.
+    #[inline]
+    pub fn shifted(table: Result<TableView<'t>, TableError>, offset: LevelOffset) -> Self {
         let droop = match &table {
-            Ok(view) => view.header().droop,
+            Ok(view) => view.working().droop,
             Err(_) => Droop::PAPER,
         };
         let response = table.as_ref().ok().and_then(|view| {
-            let tick_ms = view.header().tick_ms;
-            let law = *view.response()?;
-            Some(Response::new(law, tick_ms, LevelOffset::NONE))
+            let tick_ms = view.working().tick_ms;
+            let law = view.response()?;
+            Some(Response::new(law, tick_ms, offset))
         });
         let mut state = PhaseState::INITIAL;
         if response.is_some() {
@@ -157,7 +164,7 @@ impl<'t> ControlLoop<'t> {
         let (next, step) = self.state.step_ahead(table, state, ahead);
         self.state = next;
         let (participation, source) = match step {
-            Decision::Level(level) => (table.header().participation(level), Source::Table),
+            Decision::Level(level) => (table.working().participation(level), Source::Table),
             Decision::Outside => (self.droop.participation(state), Source::DroopOutside),
         };
         Action {
@@ -199,9 +206,9 @@ impl<'t> ControlLoop<'t> {
         }
     }
 
-    /// The header of a table whose commands act late.
-    fn delayed(&self) -> Option<&Header> {
-        let header = self.table.as_ref().ok()?.header();
+    /// What is at hand of a table whose commands act late.
+    fn delayed(&self) -> Option<&Working> {
+        let header = self.table.as_ref().ok()?.working();
         (header.delay_ticks > 0).then_some(header)
     }
 

@@ -42,6 +42,8 @@ pub struct ObserverConfig {
     twice_inertia: f32,
     /// Fleet power per ppm of participation \[GW\].
     fleet_gw_per_ppm: f32,
+    /// K = 1/R_eq \[GW/Hz\].
+    governor_gain: f32,
 }
 
 /// Why no observer can be made.
@@ -92,6 +94,7 @@ impl ObserverConfig {
             damping: s(plant.damping_kw_per_hz),
             twice_inertia: 2.0 * s(plant.inertia_kw_s_per_hz),
             fleet_gw_per_ppm: s(plant.fleet_kw) / MICRO as f32,
+            governor_gain: k,
         })
     }
 }
@@ -148,9 +151,9 @@ pub struct Observer {
 impl Observer {
     /// An observer at rest at a frequency deviation \[µHz\]: the chain in its steady state g = l =
     /// p = K f.
-    pub fn at_rest(config: ObserverConfig, plant: &PlantParameters, f_uhz: i32) -> Self {
+    pub fn at_rest(config: ObserverConfig, f_uhz: i32) -> Self {
         let f_hz = f_uhz as f32 / MICRO as f32;
-        let rest = plant.governor_gain_kw_per_hz as f32 / MICRO as f32 * f_hz;
+        let rest = config.governor_gain * f_hz;
         Self {
             config,
             chain: [rest; 3],
@@ -160,8 +163,10 @@ impl Observer {
     }
 
     /// Forgets everything: at rest again, at this deviation \[µHz\].
-    pub fn restart(&mut self, plant: &PlantParameters, f_uhz: i32) {
-        *self = Self::at_rest(self.config, plant, f_uhz);
+    pub fn restart(&mut self, f_uhz: i32) {
+        self.f_hz = f_uhz as f32 / MICRO as f32;
+        self.chain = [self.config.governor_gain * self.f_hz; 3];
+        self.loss = LossEstimator::EMPTY;
     }
 
     /// Takes the frequency deviation measured at this tick \[µHz\] and returns the state estimate.
@@ -265,7 +270,7 @@ mod tests {
             ticks in proptest::collection::vec((-900_000i32..900_000, 0u32..=1_000_000, any::<bool>()), 1..60),
         ) {
             let config = ObserverConfig::new(&PlantParameters::PAPER, 100).unwrap();
-            let start = Observer::at_rest(config, &PlantParameters::PAPER, 0);
+            let start = Observer::at_rest(config, 0);
             let (mut asked, mut passed) = (start, start);
             for (f_uhz, ppm, pass) in ticks {
                 let fleet = Participation::from_ppm(ppm);
@@ -292,7 +297,7 @@ mod tests {
             participations in proptest::collection::vec(0u32..=1_000_000, 8),
         ) {
             let config = ObserverConfig::new(&PlantParameters::PAPER, TICK_MS).expect("the paper's chain");
-            let mut observer = Observer::at_rest(config, &PlantParameters::PAPER, 0);
+            let mut observer = Observer::at_rest(config, 0);
             // The fleet may step by all of its power at any tick, the loss at the first: both at
             // ticks, so f' bends nowhere inside one. Imbalance and |l - p| below 4 GW in every such
             // run.
@@ -325,7 +330,7 @@ mod tests {
             ppm in 0u32..=1_000_000,
         ) {
             let config = ObserverConfig::new(&PlantParameters::PAPER, TICK_MS).expect("the paper's chain");
-            let mut observer = Observer::at_rest(config, &PlantParameters::PAPER, 0);
+            let mut observer = Observer::at_rest(config, 0);
             let input = InputError {
                 reading_uhz: eps as u32 + 1,
                 curvature_uhz_per_s2: InputError::curvature_uhz_per_s2(&PlantParameters::PAPER, 4_000_000, 4_000_000),
@@ -352,7 +357,7 @@ mod tests {
         #[test]
         fn any_readings_give_an_estimate(readings in proptest::collection::vec(any::<i32>(), 1..100)) {
             let config = ObserverConfig::new(&PlantParameters::PAPER, TICK_MS).expect("the paper's chain");
-            let mut observer = Observer::at_rest(config, &PlantParameters::PAPER, 0);
+            let mut observer = Observer::at_rest(config, 0);
             for reading in readings {
                 prop_assert_eq!(observer.step(reading).0[0], reading);
                 let _ = observer.loss_kw(Participation::ALL);
@@ -367,7 +372,7 @@ mod tests {
         let config =
             ObserverConfig::new(&PlantParameters::PAPER, TICK_MS).expect("the paper's chain");
         let bias = 5_000;
-        let mut observer = Observer::at_rest(config, &PlantParameters::PAPER, bias);
+        let mut observer = Observer::at_rest(config, bias);
         let mut x = [0.0; 4];
         let mut loss = None;
         observer.step(bias);

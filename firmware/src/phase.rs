@@ -114,7 +114,7 @@ impl PhaseState {
         measured: State,
         ahead: impl FnOnce() -> State,
     ) -> (Self, Decision) {
-        let header = table.header();
+        let header = table.working();
         match self.phase {
             // Chargers can only answer a fall: above I1 there is nothing to do before the event.
             Phase::NoControl if measured.frequency_uhz() >= header.outer.low_uhz => {
@@ -135,7 +135,7 @@ impl PhaseState {
     }
 
     fn decide(self, table: &TableView<'_>, state: State) -> (Self, Decision) {
-        let header = table.header();
+        let header = table.working();
         let cell = header.grid.quantise(state);
         let law = |law: Law| cell.and_then(|cell| table.lookup(law, cell));
         // The decision holds for this tick and `period_ticks - 1` more.

@@ -215,9 +215,9 @@ fn header_bytes_are_as_documented() {
     let table = TableView::parse(&image).unwrap();
     let mut expected = header();
     expected.laws = table.header().laws;
-    assert_eq!(*table.header(), expected);
+    assert_eq!(table.header(), expected);
     assert_eq!(
-        write_header(table.header())[field::SPEC_HASH.start..],
+        write_header(&table.header())[field::SPEC_HASH.start..],
         image[field::SPEC_HASH.start..HEADER_LEN],
         "what was read is written again"
     );
@@ -230,7 +230,7 @@ fn a_response_lies_between_header_and_crc() {
     assert_eq!(image[field::FLAGS], [7]);
     assert_eq!(write_response(&LAW), LAW_BYTES);
     let table = TableView::parse(&image).unwrap();
-    assert_eq!(table.response(), Some(&LAW));
+    assert_eq!(table.response(), Some(LAW));
     assert!(table.header().always_on && table.prediction().is_none());
     assert_eq!(table.lookup(Law::C1, Cell([0; 4])), None);
     assert_eq!(TableView::parse(&self::image()).unwrap().response(), None);

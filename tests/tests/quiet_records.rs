@@ -38,7 +38,7 @@ fn samples(table: &str, record: &Record) -> Vec<ReplaySample> {
 fn smallest_change(table: &str) -> f64 {
     let path = tests::root().join(format!("firmware/tables/{table}.bin"));
     let bytes = std::fs::read(path).unwrap();
-    let law = *TableView::parse(&bytes).unwrap().response().unwrap();
+    let law = TableView::parse(&bytes).unwrap().response().unwrap();
     f64::from(law.smallest_change_ppm) / 1e6
 }
 

@@ -349,7 +349,7 @@ typedef struct holdfast_config {
 // Counted in words of the core's own size, for most of it is numbers and pointers.
 typedef struct holdfast_provider {
   // Not for the caller.
-  size_t words[328];
+  size_t words[256];
 } holdfast_provider;
 
 // What a provider is told at every tick.

@@ -20,7 +20,7 @@ use crate::settings;
 #[repr(C)]
 pub struct Provider {
     /// Not for the caller.
-    pub words: [usize; 328],
+    pub words: [usize; 256],
 }
 
 impl Resident for LimitProvider<'static> {

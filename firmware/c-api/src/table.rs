@@ -116,7 +116,12 @@ pub unsafe extern "C" fn holdfast_compare(
                 TableView::parse(flash::image(region)).map_err(|_| Status::TableRejected)?;
             let filter = Filter::new(config.charger.filter_ticks);
             let installation = &config.installation;
-            Ok(misfits(table.header(), installation, config.meter, &filter))
+            Ok(misfits(
+                &table.header(),
+                installation,
+                config.meter,
+                &filter,
+            ))
         })
     };
     let (bits, status) = match compared {

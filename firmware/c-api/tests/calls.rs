@@ -41,7 +41,7 @@ fn zeroed_config() -> Config {
 }
 
 fn zeroed_provider() -> Box<Provider> {
-    Box::new(Provider { words: [0; 328] })
+    Box::new(Provider { words: [0; 256] })
 }
 
 fn init(provider: &mut Provider, table: &'static [u8], config: &Config) -> Status {

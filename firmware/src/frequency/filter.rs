@@ -12,46 +12,52 @@ pub const FILTER_TICKS_MAX: usize = 8;
 /// Moving average over up to [`FILTER_TICKS_MAX`] ticks.
 #[derive(Debug, Clone)]
 pub struct Filter {
-    samples: heapless::Deque<i32, FILTER_TICKS_MAX>,
-    ticks: usize,
+    /// The last deviations, the newest first.
+    samples: [i32; FILTER_TICKS_MAX],
+    /// How many of them there are, at most `ticks`.
+    known: u8,
+    ticks: u8,
 }
 
 impl Filter {
     /// A filter over this many ticks, limited to 1..=[`FILTER_TICKS_MAX`].
     pub fn new(ticks: u8) -> Self {
         Self {
-            samples: heapless::Deque::new(),
-            ticks: usize::from(ticks).clamp(1, FILTER_TICKS_MAX),
+            samples: [0; FILTER_TICKS_MAX],
+            known: 0,
+            ticks: ticks.clamp(1, FILTER_TICKS_MAX as u8),
         }
     }
 
     /// Lag behind a ramp, in half ticks: N - 1.
     pub const fn lag_half_ticks(&self) -> usize {
-        self.ticks - 1
+        self.ticks as usize - 1
     }
 
     /// Takes a deviation \[µHz\] and returns the mean of the last N, rounded down; of fewer while
     /// it fills.
     pub fn step(&mut self, deviation_uhz: i32) -> i32 {
-        if self.samples.len() >= self.ticks {
-            let _oldest = self.samples.pop_front();
+        // A few words to move are less code than a ring.
+        let mut moved = deviation_uhz;
+        for sample in &mut self.samples {
+            moved = core::mem::replace(sample, moved);
         }
-        // There is room: at most ticks - 1 samples are left.
-        let _ = self.samples.push_back(deviation_uhz);
+        self.known = self.ticks.min(self.known + 1);
         if self.ticks == 1 {
             return deviation_uhz;
         }
         // Raised by 2^31, so that nothing is negative and the quotient is rounded down.
         let raised = |sample: &i32| u64::from(sample.wrapping_sub(i32::MIN).cast_unsigned());
-        let sum: u64 = self.samples.iter().map(raised).sum();
-        divide(sum, self.samples.len() as u32)
+        let known = self.samples.iter().take(self.known.into());
+        let sum: u64 = known.map(raised).sum();
+        divide(sum, self.known.into())
             .cast_signed()
             .wrapping_add(i32::MIN)
     }
 
     /// Forgets the past.
     pub fn reset(&mut self) {
-        self.samples.clear();
+        self.known = 0;
     }
 }
 

@@ -311,7 +311,7 @@ impl<'w> Session<'w> {
             return Response::Refused;
         };
         let level = self.view.as_ref().and_then(|table| {
-            let cell = table.header().grid.quantise(state)?;
+            let cell = table.working().grid.quantise(state)?;
             table.lookup(*law, cell)
         });
         Response::Level(level)

@@ -51,11 +51,13 @@ impl AffineFunction {
 
     /// Whether every partial sum over the grid's cells fits 32 bits.
     pub fn fits(&self, grid: &Grid) -> bool {
-        let mut largest = i64::from(self.constant).abs();
+        let mut largest = self.constant.unsigned_abs();
         for (factor, count) in self.factors.iter().zip(grid.count()) {
-            largest += i64::from(*factor).abs() * i64::from(count - 1);
+            // At most 2^15 · 2^16; a sum that saturates is too large anyway.
+            let term = u32::from(factor.unsigned_abs()) * u32::from(count - 1);
+            largest = largest.saturating_add(term);
         }
-        largest <= i64::from(i32::MAX)
+        largest <= i32::MAX as u32
     }
 
     /// Value at a cell; wraps for a cell of another grid.

@@ -114,11 +114,12 @@ impl<'t> DomainView<'t> {
             LEAF_LOOK_AHEAD.. => leaf - LEAF_LOOK_AHEAD < *ahead,
             _ => leaf - LEAF_HALF_SPACE < *count,
         };
+        let (nodes, _) = NodesView::parse(nodes, &exists)?;
         Ok(Self::Tree {
             spaces,
             hull: *hull,
             aheads,
-            nodes: NodesView::parse(nodes, &exists)?,
+            nodes,
         })
     }
 
@@ -182,7 +183,7 @@ impl<'t> DomainView<'t> {
             } => {
                 let steps = aheads.iter().map(|[_, steps, ..]| u16::from(*steps)).max();
                 let asked = u16::from(*hull).max(u16::from(!spaces.is_empty()));
-                nodes.depth() + asked.max(steps.unwrap_or(0))
+                nodes.shape().depth + asked.max(steps.unwrap_or(0))
             }
         }
     }
@@ -196,7 +197,7 @@ impl<'t> DomainView<'t> {
                 aheads,
                 nodes,
                 ..
-            } => nodes.leaves() + (spaces.len() / AFFINE_LEN + aheads.len()) as u32,
+            } => nodes.shape().leaves + (spaces.len() / AFFINE_LEN + aheads.len()) as u32,
         }
     }
 }

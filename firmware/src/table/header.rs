@@ -133,3 +133,55 @@ impl Header {
         Participation::from_ppm(self.input_step_ppm.saturating_mul(level as u32))
     }
 }
+
+/// What a charger needs of the header at every tick, kept at hand; the rest is read anew from the
+/// image when somebody asks ([`TableView::header`](super::TableView::header)).
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Working {
+    /// Grid of the abstraction.
+    pub grid: Grid,
+    /// Difference between neighbouring input levels \[ppm of the fleet\].
+    pub input_step_ppm: u32,
+    /// Input levels, 1..=32.
+    pub levels: u8,
+    /// Whether Hold follows C1 and C2 (otherwise Fixed).
+    pub stay: bool,
+    /// Whether the table is a response.
+    pub always_on: bool,
+    /// Length of a tick \[ms\].
+    pub tick_ms: u16,
+    /// Ticks for which C1, C2 and Hold hold a decision; not zero.
+    pub period_ticks: u16,
+    /// Ticks from a command to its power.
+    pub delay_ticks: u16,
+    /// I1.
+    pub outer: Band,
+    /// I2.
+    pub inner: Band,
+    /// The fallback.
+    pub droop: Droop,
+}
+
+impl Working {
+    /// Of a header.
+    pub(super) const fn of(header: &Header) -> Self {
+        Self {
+            grid: header.grid,
+            input_step_ppm: header.input_step_ppm,
+            levels: header.levels,
+            stay: header.stay,
+            always_on: header.always_on,
+            tick_ms: header.tick_ms,
+            period_ticks: header.period_ticks,
+            delay_ticks: header.delay_ticks,
+            outer: header.outer,
+            inner: header.inner,
+            droop: header.droop,
+        }
+    }
+
+    /// Participation of an input level; levels past the last saturate at the whole fleet.
+    pub const fn participation(&self, level: u8) -> Participation {
+        Participation::from_ppm(self.input_step_ppm.saturating_mul(level as u32))
+    }
+}

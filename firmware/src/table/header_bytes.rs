@@ -3,16 +3,18 @@
 //! Where each field stands is said once, in [`field`].
 
 use super::TableError;
-use super::bytes::{array_at, byte_at, i32_at, u16_at, u32_at};
+use super::bytes::{HeaderWords, WORD, array_at, u16_at, u32_at};
 use super::checksum;
 use super::field::{self, Field, entry};
-use super::header::{Header, LAWS, LEVELS_MAX, LawEntry, PlantParameters, TICK_MS_MAX};
+use super::header::{
+    Header, LAWS, LEVELS_MAX, LawEntry, PlantParameters, SPEC_HASH_LEN, TICK_MS_MAX, Working,
+};
 use super::hypotheses::Hypotheses;
 use super::response_part::RESPONSE_LEN;
 use crate::droop::Droop;
 use crate::grid::Grid;
 use crate::prediction::{DELAY_TICKS_MAX, LEVELS_KEPT, prediction_len};
-use crate::units::{Band, MICRO, STATES};
+use crate::units::{Band, MICRO};
 
 /// First bytes of every table: "Holdfast decision table".
 pub const MAGIC: [u8; 4] = *b"HFDT";
@@ -54,6 +56,9 @@ const _: () = {
 // Every level fits the memory of the commands under way.
 const _: () = assert!(LEVELS_MAX <= LEVELS_KEPT);
 
+/// A directory entry in words.
+type EntryWords = [u32; DIRECTORY_ENTRY_LEN / WORD];
+
 /// Where the entry of the law with this index begins.
 const fn entry_at(index: usize) -> usize {
     field::DIRECTORY.start + index * DIRECTORY_ENTRY_LEN
@@ -65,6 +70,97 @@ impl Header {
     /// # Errors
     /// The first check that fails, in the order magic, byte order, version, length, CRC, fields.
     pub fn parse(bytes: &[u8]) -> Result<Self, TableError> {
+        let words = HeaderWords::of_sound(bytes)?;
+        let header = Self::decode(&words, read_grid(&words)?);
+        header.check(&words, bytes.len())?;
+        Ok(header)
+    }
+
+    /// The fields as they stand; the grid was read before. A number that means nothing, which
+    /// [`Header::check`] refuses, is read as the first of its kind.
+    #[inline(never)]
+    pub(super) fn decode(words: &HeaderWords, grid: Grid) -> Self {
+        let flags = words.byte(field::FLAGS.start);
+        let mut spec_hash = [0; SPEC_HASH_LEN];
+        let hash = words.0.iter().skip(field::SPEC_HASH.start / WORD);
+        for (bytes, word) in spec_hash.as_chunks_mut().0.iter_mut().zip(hash) {
+            *bytes = word.to_le_bytes();
+        }
+        Self {
+            spec_hash,
+            grid,
+            input_step_ppm: words.word(field::INPUT_STEP.start),
+            levels: words.byte(field::LEVELS.start),
+            stay: flags & FLAG_STAY != 0,
+            always_on: flags & FLAG_ALWAYS_ON != 0,
+            tick_ms: words.half(field::TICK.start),
+            period_ticks: words.half(field::PERIOD.start),
+            delay_ticks: words.half(field::DELAY.start),
+            outer: read_band(words, &field::OUTER),
+            inner: read_band(words, &field::INNER),
+            droop: Droop {
+                deadband_uhz: words.word(field::DROOP_DEADBAND.start),
+                full_uhz: words.word(field::DROOP_FULL.start),
+            },
+            plant: read_plant(words),
+            hypotheses: Hypotheses::decode(words, flags & FLAG_OWN_CLOCKS != 0),
+            laws: {
+                let mut laws = [None; LAWS];
+                for (law, entry) in laws.iter_mut().zip(directory(words)) {
+                    let entry = read_entry(entry);
+                    *law = (entry.inputs_kind != ABSENT).then_some(entry);
+                }
+                laws
+            },
+        }
+    }
+
+    /// Whether every field is in its range, for an image of so many bytes.
+    fn check(&self, words: &HeaderWords, length: usize) -> Result<(), TableError> {
+        check((1..=LEVELS_MAX).contains(&self.levels), &field::LEVELS)?;
+        let full = u64::from(self.input_step_ppm) * u64::from(self.levels - 1);
+        check(full <= MICRO as u64, &field::INPUT_STEP)?;
+        let flags = words.byte(field::FLAGS.start);
+        check(flags & !FLAGS == 0, &field::FLAGS)?;
+        check((1..=TICK_MS_MAX).contains(&self.tick_ms), &field::TICK)?;
+        check(self.period_ticks > 0, &field::PERIOD)?;
+        // The prediction part lies between header and blocks. A response predicts nothing.
+        let least = HEADER_LEN + prediction_len(self.delay_ticks) + CRC_LEN;
+        let has_room = self.delay_ticks <= DELAY_TICKS_MAX && length >= least;
+        let predicts = self.always_on && self.delay_ticks > 0;
+        check(has_room && !predicts, &field::DELAY)?;
+        let response_len = if self.always_on { RESPONSE_LEN } else { 0 };
+        check(length >= least + response_len, &field::FLAGS)?;
+        let (outer, inner) = (self.outer, self.inner);
+        check(outer.low_uhz < outer.high_uhz, &field::OUTER)?;
+        let nested = outer.low_uhz <= inner.low_uhz && inner.high_uhz <= outer.high_uhz;
+        check(nested && inner.low_uhz < inner.high_uhz, &field::INNER)?;
+        check(self.droop.full_uhz > 0, &field::DROOP_FULL)?;
+        let plant = &self.plant;
+        check(plant.governor_time_us > 0, &field::GOVERNOR_TIME)?;
+        check(plant.turbine_time_us > 0, &field::TURBINE_TIME)?;
+        check(plant.lag_time_us > 0, &field::LAG_TIME)?;
+        check(plant.inertia_kw_s_per_hz > 0, &field::INERTIA)?;
+        self.hypotheses.check(words, self.tick_ms)?;
+        for (index, entry) in directory(words).iter().enumerate() {
+            let at = entry_at(index);
+            let read = read_entry(entry);
+            let absent = read.inputs_kind == ABSENT;
+            let empty = read.domain_kind == ABSENT
+                && read.worst_visits == 0
+                && read.domain_len == 0
+                && read.inputs_len == 0;
+            // A table is by games or a response, not both.
+            let sound = if absent { empty } else { !self.always_on };
+            check(sound, &(at..at + DIRECTORY_ENTRY_LEN))?;
+        }
+        Ok(())
+    }
+}
+
+impl HeaderWords {
+    /// The header's words of an image whose magic, byte order, version, length and CRC are right.
+    fn of_sound(bytes: &[u8]) -> Result<Self, TableError> {
         let needed = HEADER_LEN + CRC_LEN;
         if bytes.len() < needed {
             return Err(TableError::TooShort {
@@ -102,67 +198,25 @@ impl Header {
         if computed != stored {
             return Err(TableError::BadCrc { computed, stored });
         }
-        Self::fields(bytes)
+        Ok(Self::read(bytes))
     }
+}
 
-    fn fields(bytes: &[u8]) -> Result<Self, TableError> {
-        let grid = read_grid(bytes)?;
-        let input_step_ppm = u32_at(bytes, field::INPUT_STEP.start);
-        let levels = byte_at(bytes, field::LEVELS.start);
-        check((1..=LEVELS_MAX).contains(&levels), &field::LEVELS)?;
-        let full = u64::from(input_step_ppm) * u64::from(levels - 1);
-        check(full <= MICRO as u64, &field::INPUT_STEP)?;
-        let flags = byte_at(bytes, field::FLAGS.start);
-        check(flags & !FLAGS == 0, &field::FLAGS)?;
-        let always_on = flags & FLAG_ALWAYS_ON != 0;
-        let tick_ms = u16_at(bytes, field::TICK.start);
-        check((1..=TICK_MS_MAX).contains(&tick_ms), &field::TICK)?;
-        let period_ticks = u16_at(bytes, field::PERIOD.start);
-        check(period_ticks > 0, &field::PERIOD)?;
-        let delay_ticks = u16_at(bytes, field::DELAY.start);
-        // The prediction part lies between header and blocks. A response predicts nothing.
-        let least = HEADER_LEN + prediction_len(delay_ticks) + CRC_LEN;
-        let has_room = delay_ticks <= DELAY_TICKS_MAX && bytes.len() >= least;
-        check(has_room && !(always_on && delay_ticks > 0), &field::DELAY)?;
-        let response_len = if always_on { RESPONSE_LEN } else { 0 };
-        check(bytes.len() >= least + response_len, &field::FLAGS)?;
-        let outer = read_band(bytes, &field::OUTER);
-        let inner = read_band(bytes, &field::INNER);
-        check(outer.low_uhz < outer.high_uhz, &field::OUTER)?;
-        let nested = outer.low_uhz <= inner.low_uhz && inner.high_uhz <= outer.high_uhz;
-        check(nested && inner.low_uhz < inner.high_uhz, &field::INNER)?;
-        let droop = Droop {
-            deadband_uhz: u32_at(bytes, field::DROOP_DEADBAND.start),
-            full_uhz: u32_at(bytes, field::DROOP_FULL.start),
-        };
-        check(droop.full_uhz > 0, &field::DROOP_FULL)?;
-        let plant = read_plant(bytes)?;
-        let hypotheses = Hypotheses::read(bytes, tick_ms, flags & FLAG_OWN_CLOCKS != 0)?;
-        let mut laws = [None; LAWS];
-        for (index, law) in laws.iter_mut().enumerate() {
-            *law = read_entry(bytes, entry_at(index))?;
-            // A table is by games or a response, not both.
-            let at = entry_at(index);
-            check(!always_on || law.is_none(), &(at..at + DIRECTORY_ENTRY_LEN))?;
-        }
-        Ok(Self {
-            spec_hash: array_at(bytes, field::SPEC_HASH.start).unwrap_or_default(),
-            grid,
-            input_step_ppm,
-            levels,
-            stay: flags & FLAG_STAY != 0,
-            always_on,
-            tick_ms,
-            period_ticks,
-            delay_ticks,
-            outer,
-            inner,
-            droop,
-            plant,
-            hypotheses,
-            laws,
-        })
-    }
+/// Checks the header, as [`Header::parse`] does, and reads what a charger keeps of it and the
+/// directory.
+///
+/// Not inlined: what it needs must not lie on the stack while the laws are checked.
+///
+/// # Errors
+/// As [`Header::parse`].
+#[inline(never)]
+pub(super) fn read_working(
+    bytes: &[u8],
+) -> Result<(Working, [Option<LawEntry>; LAWS]), TableError> {
+    let words = HeaderWords::of_sound(bytes)?;
+    let header = Header::decode(&words, read_grid(&words)?);
+    header.check(&words, bytes.len())?;
+    Ok((Working::of(&header), header.laws))
 }
 
 fn check(ok: bool, field: &Field) -> Result<(), TableError> {
@@ -173,62 +227,62 @@ fn check(ok: bool, field: &Field) -> Result<(), TableError> {
     }
 }
 
-fn read_grid(bytes: &[u8]) -> Result<Grid, TableError> {
-    let mut lower = [0i32; STATES];
-    let mut width = [0u32; STATES];
-    let mut count = [0u16; STATES];
-    for axis in 0..STATES {
-        lower[axis] = i32_at(bytes, field::LOWER_EDGE.start + 4 * axis);
-        width[axis] = u32_at(bytes, field::WIDTH.start + 4 * axis);
-        count[axis] = u16_at(bytes, field::COUNT.start + 2 * axis);
-    }
-    Grid::new(lower, width, count).map_err(TableError::BadGrid)
+fn read_grid(words: &HeaderWords) -> Result<Grid, TableError> {
+    let [f, g, l, p] = words.four(field::LOWER_EDGE.start);
+    let lower_edge = [
+        f.cast_signed(),
+        g.cast_signed(),
+        l.cast_signed(),
+        p.cast_signed(),
+    ];
+    let at = field::COUNT.start;
+    let count = [
+        words.half(at),
+        words.half(at + 2),
+        words.half(at + 4),
+        words.half(at + 6),
+    ];
+    Grid::new(lower_edge, words.four(field::WIDTH.start), count).map_err(TableError::BadGrid)
 }
 
-fn read_band(bytes: &[u8], field: &Field) -> Band {
+fn read_band(words: &HeaderWords, field: &Field) -> Band {
     Band {
-        low_uhz: i32_at(bytes, field.start),
-        high_uhz: i32_at(bytes, field.start + 4),
+        low_uhz: words.signed(field.start),
+        high_uhz: words.signed(field.start + WORD),
     }
 }
 
-fn read_plant(bytes: &[u8]) -> Result<PlantParameters, TableError> {
-    let plant = PlantParameters {
-        governor_gain_kw_per_hz: i32_at(bytes, field::GOVERNOR_GAIN.start),
-        governor_time_us: u32_at(bytes, field::GOVERNOR_TIME.start),
-        turbine_time_us: u32_at(bytes, field::TURBINE_TIME.start),
-        lead_time_us: u32_at(bytes, field::LEAD_TIME.start),
-        lag_time_us: u32_at(bytes, field::LAG_TIME.start),
-        damping_kw_per_hz: u32_at(bytes, field::DAMPING.start),
-        inertia_kw_s_per_hz: u32_at(bytes, field::INERTIA.start),
-        fleet_kw: u32_at(bytes, field::FLEET.start),
-    };
-    check(plant.governor_time_us > 0, &field::GOVERNOR_TIME)?;
-    check(plant.turbine_time_us > 0, &field::TURBINE_TIME)?;
-    check(plant.lag_time_us > 0, &field::LAG_TIME)?;
-    check(plant.inertia_kw_s_per_hz > 0, &field::INERTIA)?;
-    Ok(plant)
+/// The plant.
+pub(super) fn read_plant(words: &HeaderWords) -> PlantParameters {
+    PlantParameters {
+        governor_gain_kw_per_hz: words.signed(field::GOVERNOR_GAIN.start),
+        governor_time_us: words.word(field::GOVERNOR_TIME.start),
+        turbine_time_us: words.word(field::TURBINE_TIME.start),
+        lead_time_us: words.word(field::LEAD_TIME.start),
+        lag_time_us: words.word(field::LAG_TIME.start),
+        damping_kw_per_hz: words.word(field::DAMPING.start),
+        inertia_kw_s_per_hz: words.word(field::INERTIA.start),
+        fleet_kw: words.word(field::FLEET.start),
+    }
 }
 
-/// The directory entry at an offset; `None` for a law that the table does not hold, whose kinds are
-/// [`ABSENT`] and whose other fields are 0.
-fn read_entry(bytes: &[u8], at: usize) -> Result<Option<LawEntry>, TableError> {
-    let entry = LawEntry {
-        domain_kind: byte_at(bytes, at + entry::DOMAIN_KIND.start),
-        inputs_kind: byte_at(bytes, at + entry::INPUTS_KIND.start),
-        worst_visits: u16_at(bytes, at + entry::WORST_VISITS.start),
-        domain_len: u32_at(bytes, at + entry::DOMAIN_LEN.start),
-        inputs_len: u32_at(bytes, at + entry::INPUTS_LEN.start),
-    };
-    if entry.inputs_kind != ABSENT {
-        return Ok(Some(entry));
+/// The words of the directory, an entry for each law.
+fn directory(words: &HeaderWords) -> &[EntryWords] {
+    let entries = words.0.split_at(field::DIRECTORY.start / WORD).1;
+    entries.as_chunks().0
+}
+
+/// A directory entry. A law that the table does not hold has kinds that are [`ABSENT`], and all
+/// else is 0.
+fn read_entry(words: &EntryWords) -> LawEntry {
+    let part = |field: Field| words[field.start / WORD] >> (8 * (field.start % WORD));
+    LawEntry {
+        domain_kind: part(entry::DOMAIN_KIND) as u8,
+        inputs_kind: part(entry::INPUTS_KIND) as u8,
+        worst_visits: part(entry::WORST_VISITS) as u16,
+        domain_len: part(entry::DOMAIN_LEN),
+        inputs_len: part(entry::INPUTS_LEN),
     }
-    let empty = entry.domain_kind == ABSENT
-        && entry.worst_visits == 0
-        && entry.domain_len == 0
-        && entry.inputs_len == 0;
-    check(empty, &(at..at + DIRECTORY_ENTRY_LEN))?;
-    Ok(None)
 }
 
 /// Why a table cannot be written.

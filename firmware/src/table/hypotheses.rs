@@ -4,7 +4,7 @@
 //! spec. Intervals are `[least, most]`.
 
 use super::TableError;
-use super::bytes::{byte_at, i32_at, u16_at, u32_at};
+use super::bytes::HeaderWords;
 use super::field::{self, Field};
 use crate::units::{MICRO, STATES};
 
@@ -70,11 +70,6 @@ pub struct Hypotheses {
     pub generator: u32,
 }
 
-/// The two ends of an interval of `u32`.
-fn pair(bytes: &[u8], field: &Field) -> [u32; 2] {
-    [field.start, field.start + 4].map(|at| u32_at(bytes, at))
-}
-
 impl Hypotheses {
     /// The paper's bidirectional fleet: everything is known exactly, 2 GW are lost.
     pub const PAPER: Self = Self {
@@ -97,8 +92,42 @@ impl Hypotheses {
         generator: 0,
     };
 
-    /// Reads and checks the block of a header; tick and own clocks stand before it.
-    pub(super) fn read(bytes: &[u8], tick_ms: u16, own_clocks: bool) -> Result<Self, TableError> {
+    /// The block of a header as it stands; own clocks are a flag before it.
+    #[inline(always)]
+    pub(super) fn decode(words: &HeaderWords, own_clocks: bool) -> Self {
+        let times = |field: Field| [words.half(field.start), words.half(field.start + 2)];
+        let signed = |field: Field| [words.signed(field.start), words.signed(field.start + 4)];
+        let pair = |field: Field| [words.word(field.start), words.word(field.start + 4)];
+        Self {
+            estimate_error: words.four(field::ESTIMATE_ERROR.start),
+            meter_lag_ms: times(field::METER_LAG),
+            actuation_delay_ms: times(field::ACTUATION_DELAY),
+            participation_relative_ppm: words.word(field::PARTICIPATION_RELATIVE.start),
+            participation_absolute_ppm: words.word(field::PARTICIPATION_ABSOLUTE.start),
+            loss_kw: signed(field::LOSS),
+            loss_profile: match words.byte(field::LOSS_PROFILE.start) {
+                1 => LossProfile::Constant,
+                2 => LossProfile::NonDecreasing,
+                _ => LossProfile::Band,
+            },
+            direction: match words.byte(field::DIRECTION.start) {
+                1 => Direction::Bidirectional,
+                _ => Direction::Unidirectional,
+            },
+            own_clocks,
+            tick_most_ms: words.half(field::TICK_MOST.start),
+            inertia_kw_s_per_hz: pair(field::INERTIA_BAND),
+            governor_gain_kw_per_hz: signed(field::GOVERNOR_GAIN_BAND),
+            damping_kw_per_hz: pair(field::DAMPING_BAND),
+            power_per_charger_w: words.word(field::POWER_PER_CHARGER.start),
+            chargers: words.word(field::CHARGERS.start),
+            table_version: words.word(field::TABLE_VERSION.start),
+            generator: words.word(field::GENERATOR.start),
+        }
+    }
+
+    /// Whether every number of the block is in its range, and means something.
+    pub(super) fn check(&self, words: &HeaderWords, tick_ms: u16) -> Result<(), TableError> {
         let check = |ok: bool, field: &Field| {
             if ok {
                 Ok(())
@@ -106,70 +135,31 @@ impl Hypotheses {
                 Err(TableError::bad_field(field))
             }
         };
-        let times = |field: &Field| [field.start, field.start + 2].map(|at| u16_at(bytes, at));
-        let signed = |field: &Field| [field.start, field.start + 4].map(|at| i32_at(bytes, at));
-        let error_at = field::ESTIMATE_ERROR.start;
-        let loss_profile = match byte_at(bytes, field::LOSS_PROFILE.start) {
-            0 => LossProfile::Band,
-            1 => LossProfile::Constant,
-            2 => LossProfile::NonDecreasing,
-            _ => return Err(TableError::bad_field(&field::LOSS_PROFILE)),
-        };
-        let direction = match byte_at(bytes, field::DIRECTION.start) {
-            0 => Direction::Unidirectional,
-            1 => Direction::Bidirectional,
-            _ => return Err(TableError::bad_field(&field::DIRECTION)),
-        };
-        let read = Self {
-            estimate_error: core::array::from_fn(|axis| u32_at(bytes, error_at + 4 * axis)),
-            meter_lag_ms: times(&field::METER_LAG),
-            actuation_delay_ms: times(&field::ACTUATION_DELAY),
-            participation_relative_ppm: u32_at(bytes, field::PARTICIPATION_RELATIVE.start),
-            participation_absolute_ppm: u32_at(bytes, field::PARTICIPATION_ABSOLUTE.start),
-            loss_kw: signed(&field::LOSS),
-            loss_profile,
-            direction,
-            own_clocks,
-            tick_most_ms: u16_at(bytes, field::TICK_MOST.start),
-            inertia_kw_s_per_hz: pair(bytes, &field::INERTIA_BAND),
-            governor_gain_kw_per_hz: signed(&field::GOVERNOR_GAIN_BAND),
-            damping_kw_per_hz: pair(bytes, &field::DAMPING_BAND),
-            power_per_charger_w: u32_at(bytes, field::POWER_PER_CHARGER.start),
-            chargers: u32_at(bytes, field::CHARGERS.start),
-            table_version: u32_at(bytes, field::TABLE_VERSION.start),
-            generator: u32_at(bytes, field::GENERATOR.start),
-        };
-        let ordered = |[low, high]: [i64; 2], field: &Field| check(low <= high, field);
-        ordered(read.meter_lag_ms.map(i64::from), &field::METER_LAG)?;
-        ordered(
-            read.actuation_delay_ms.map(i64::from),
-            &field::ACTUATION_DELAY,
-        )?;
+        let is = |field: &Field, number: u8| words.byte(field.start) == number;
+        let profile = is(&field::LOSS_PROFILE, self.loss_profile as u8);
+        check(profile, &field::LOSS_PROFILE)?;
+        let direction = is(&field::DIRECTION, self.direction as u8);
+        check(direction, &field::DIRECTION)?;
+        let [low, high] = self.meter_lag_ms;
+        check(low <= high, &field::METER_LAG)?;
+        let [low, high] = self.actuation_delay_ms;
+        check(low <= high, &field::ACTUATION_DELAY)?;
         let full = MICRO as u32;
-        check(
-            read.participation_relative_ppm < full,
-            &field::PARTICIPATION_RELATIVE,
-        )?;
-        check(
-            read.participation_absolute_ppm < full,
-            &field::PARTICIPATION_ABSOLUTE,
-        )?;
-        ordered(read.loss_kw.map(i64::from), &field::LOSS)?;
-        check(read.tick_most_ms >= tick_ms, &field::TICK_MOST)?;
-        let [least, _] = read.inertia_kw_s_per_hz;
-        check(least > 0, &field::INERTIA_BAND)?;
-        ordered(
-            read.inertia_kw_s_per_hz.map(i64::from),
-            &field::INERTIA_BAND,
-        )?;
-        ordered(
-            read.governor_gain_kw_per_hz.map(i64::from),
-            &field::GOVERNOR_GAIN_BAND,
-        )?;
-        ordered(read.damping_kw_per_hz.map(i64::from), &field::DAMPING_BAND)?;
-        check(read.power_per_charger_w > 0, &field::POWER_PER_CHARGER)?;
-        check(read.chargers > 0, &field::CHARGERS)?;
-        Ok(read)
+        let relative = self.participation_relative_ppm < full;
+        check(relative, &field::PARTICIPATION_RELATIVE)?;
+        let absolute = self.participation_absolute_ppm < full;
+        check(absolute, &field::PARTICIPATION_ABSOLUTE)?;
+        let [low, high] = self.loss_kw;
+        check(low <= high, &field::LOSS)?;
+        check(self.tick_most_ms >= tick_ms, &field::TICK_MOST)?;
+        let [low, high] = self.inertia_kw_s_per_hz;
+        check(low > 0 && low <= high, &field::INERTIA_BAND)?;
+        let [low, high] = self.governor_gain_kw_per_hz;
+        check(low <= high, &field::GOVERNOR_GAIN_BAND)?;
+        let [low, high] = self.damping_kw_per_hz;
+        check(low <= high, &field::DAMPING_BAND)?;
+        check(self.power_per_charger_w > 0, &field::POWER_PER_CHARGER)?;
+        check(self.chargers > 0, &field::CHARGERS)
     }
 
     /// Writes the block into a header; own clocks are a flag of the header.

@@ -4,7 +4,7 @@
 use super::BlockError;
 use super::dense::DenseView;
 use super::domain::DomainView;
-use super::header::{Header, LawEntry};
+use super::header::{LawEntry, Working};
 use super::tree::TreeView;
 use crate::grid::{Cell, Grid};
 use crate::units::STATES;
@@ -55,20 +55,20 @@ impl<'t> LawView<'t> {
         entry: &LawEntry,
         domain: &'t [u8],
         inputs: &'t [u8],
-        header: &Header,
+        working: &Working,
     ) -> Result<Self, BlockError> {
-        let grid: &Grid = &header.grid;
+        let grid: &Grid = &working.grid;
         let domain = DomainView::parse(entry.domain_kind, domain, grid)?;
         let inputs = match entry.inputs_kind {
             kind if kind == InputsKind::Dense as u8 => {
-                Inputs::Dense(DenseView::parse(inputs, grid, header.levels)?)
+                Inputs::Dense(DenseView::parse(inputs, grid, working.levels)?)
             }
             kind if kind == InputsKind::Tree as u8 => {
                 // The tree answers for every cell; only a domain part can say which are covered.
                 if matches!(domain, DomainView::InInputs) {
                     return Err(BlockError::NoDomain);
                 }
-                Inputs::Tree(TreeView::parse(inputs, grid, header.levels)?)
+                Inputs::Tree(TreeView::parse(inputs, grid, working.levels)?)
             }
             found => return Err(BlockError::UnknownEncoding { found }),
         };

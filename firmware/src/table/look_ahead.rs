@@ -90,6 +90,7 @@ impl LookAhead {
     }
 
     /// Reads the bytes; `None` if a field is out of its range.
+    #[inline(never)]
     pub fn read(bytes: &[u8; LOOK_AHEAD_LEN]) -> Option<Self> {
         let [shift, steps] = array_at(bytes, 0)?;
         let factor = |at: usize| u16_at(bytes, FACTORS_AT + 2 * at).cast_signed();
@@ -118,18 +119,21 @@ impl LookAhead {
     }
 
     /// Whether no partial sum leaves 32 bits while the bounds are on the grid.
+    #[inline(never)]
     pub fn fits(&self, grid: &Grid) -> bool {
         let count = grid.count();
         // g, l and p have a far bound, in this order.
         let far = |d: usize| d.checked_sub(1).and_then(|at| self.far.get(at));
         (0..STATES).all(|d| {
-            let reach =
-                |j: usize| i64::from(self.factors[d][j].unsigned_abs()) * i64::from(count[j] - 1);
-            // Far rows add a second share of the indices, at most all of them.
-            let sum: i64 = 2 * (0..STATES).map(reach).sum::<i64>();
-            let near = i64::from(self.near[d].unsigned_abs());
-            let offset = near.max(far(d).map_or(0, |far| i64::from(far.unsigned_abs())));
-            sum + offset <= i64::from(i32::MAX)
+            let near = self.near[d].unsigned_abs();
+            let mut sum = near.max(far(d).map_or(0, |far| far.unsigned_abs()));
+            for (factor, count) in self.factors[d].iter().zip(count) {
+                // At most 2^15 · 2^16; a sum that saturates is too large anyway.
+                let reach = u32::from(factor.unsigned_abs()) * u32::from(count - 1);
+                // Far rows add a second share of the indices, at most all of them.
+                sum = sum.saturating_add(reach).saturating_add(reach);
+            }
+            sum <= i32::MAX as u32
         }) && self.limit[1] < count[AXIS_F]
     }
 }

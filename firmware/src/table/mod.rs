@@ -29,7 +29,7 @@ pub use domain::{
     LEAF_OUTSIDE, LOOK_AHEADS_MAX,
 };
 pub use header::{
-    Header, LAWS, LEVELS_MAX, Law, LawEntry, PlantParameters, SPEC_HASH_LEN, TICK_MS_MAX,
+    Header, LAWS, LEVELS_MAX, Law, LawEntry, PlantParameters, SPEC_HASH_LEN, TICK_MS_MAX, Working,
 };
 pub use header_bytes::{
     BYTE_ORDER_MARK, CRC_LEN, DIRECTORY_ENTRY_LEN, FORMAT_VERSION, HEADER_LEN, MAGIC, WriteError,
@@ -45,6 +45,8 @@ pub use tree_node::{Children, LEAF_VALUES, NODE_LEN_MAX, Node, SKIP_MAX};
 use crate::grid::{Cell, GridError};
 use crate::prediction::{PredictionView, prediction_len};
 use crate::response::ResponseLaw;
+use bytes::HeaderWords;
+use header_bytes::read_working;
 use response_part::read_response;
 
 /// CRC-32 as in Ethernet and zip (polynomial 0x04C11DB7 reflected).
@@ -157,9 +159,8 @@ pub enum BlockError {
 /// A table that was checked; lookups are total.
 #[derive(Debug, Clone)]
 pub struct TableView<'t> {
-    header: Header,
+    working: Working,
     laws: [Option<LawView<'t>>; LAWS],
-    response: Option<ResponseLaw>,
     bytes: &'t [u8],
 }
 
@@ -169,17 +170,16 @@ impl<'t> TableView<'t> {
     /// # Errors
     /// The first thing that is wrong with it, as a [`TableError`].
     pub fn parse(bytes: &'t [u8]) -> Result<Self, TableError> {
-        let header = Header::parse(bytes)?;
+        let (working, entries) = read_working(bytes)?;
         let mut laws = [None, None, None];
         // The header has been held against the image's length.
-        let mut at = HEADER_LEN + prediction_len(header.delay_ticks);
-        let mut response = None;
-        if header.always_on {
-            response = Some(read_response(bytes, at)?);
+        let mut at = HEADER_LEN + prediction_len(working.delay_ticks);
+        if working.always_on {
+            read_response(bytes, at)?;
             at += RESPONSE_LEN;
         }
-        for law in Law::ALL {
-            let entry = header.laws[law as usize];
+        let places = laws.iter_mut().zip(&entries);
+        for (law, (place, entry)) in Law::ALL.into_iter().zip(places) {
             let Some(entry) = entry else { continue };
             let bad = |reason| TableError::BadBlock { law, reason };
             let end = at
@@ -191,8 +191,10 @@ impl<'t> TableView<'t> {
                 .get(at..end)
                 .and_then(|block| block.split_at_checked(entry.domain_len as usize))
                 .ok_or(bad(BlockError::OutOfImage))?;
-            let view = LawView::parse(&entry, domain, inputs, &header).map_err(bad)?;
-            laws[law as usize] = Some(view);
+            match LawView::parse(entry, domain, inputs, &working) {
+                Ok(law) => *place = Some(law),
+                Err(reason) => return Err(bad(reason)),
+            }
             at = end;
         }
         if at != bytes.len() - CRC_LEN {
@@ -203,9 +205,8 @@ impl<'t> TableView<'t> {
             return Err(last);
         }
         Ok(Self {
-            header,
+            working,
             laws,
-            response,
             bytes,
         })
     }
@@ -219,30 +220,39 @@ impl<'t> TableView<'t> {
         expected: [u8; SPEC_HASH_LEN],
     ) -> Result<Self, TableError> {
         let view = Self::parse(bytes)?;
-        if view.header.spec_hash != expected {
-            return Err(TableError::ForeignSpec {
-                found: view.header.spec_hash,
-                expected,
-            });
+        let found = view.header().spec_hash;
+        if found != expected {
+            return Err(TableError::ForeignSpec { found, expected });
         }
         Ok(view)
     }
 
-    /// The header.
-    pub fn header(&self) -> &Header {
-        &self.header
+    /// The header, read anew from the image. It was checked when the image was.
+    pub fn header(&self) -> Header {
+        Header::decode(&HeaderWords::read(self.bytes), self.working.grid)
+    }
+
+    /// The plant, read anew from the image.
+    pub fn plant(&self) -> PlantParameters {
+        header_bytes::read_plant(&HeaderWords::read(self.bytes))
+    }
+
+    /// What a tick needs of the header.
+    pub const fn working(&self) -> &Working {
+        &self.working
     }
 
     /// The coefficients of the prediction, if commands act with a delay.
     pub fn prediction(&self) -> Option<PredictionView<'t>> {
-        let len = prediction_len(self.header.delay_ticks);
+        let len = prediction_len(self.working.delay_ticks);
         let part = self.bytes.get(HEADER_LEN..HEADER_LEN + len)?;
         (!part.is_empty()).then(|| PredictionView::new(part))
     }
 
-    /// The law that is always on, if the table is a response.
-    pub fn response(&self) -> Option<&ResponseLaw> {
-        self.response.as_ref()
+    /// The law that is always on, if the table is a response; read anew from the image.
+    pub fn response(&self) -> Option<ResponseLaw> {
+        let always_on = self.working.always_on;
+        always_on.then(|| read_response(self.bytes, HEADER_LEN).ok())?
     }
 
     /// The whole image.

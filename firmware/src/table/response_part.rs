@@ -3,7 +3,7 @@
 //! Eight words of four bytes. The reader accepts what [`crate::response`] is total for.
 
 use super::TableError;
-use super::bytes::{i32_at, u32_at};
+use super::bytes::WORD;
 use super::field::{Field, response};
 use crate::response::{DROOP_GAIN_MAX, ResponseLaw, WINDOW_TICKS_MAX};
 use crate::units::MICRO;
@@ -16,7 +16,12 @@ pub const RESPONSE_LEN: usize = response::SMALLEST_CHANGE.end;
 /// # Errors
 /// A parameter out of its range, with its offset in the image.
 pub(super) fn read_response(bytes: &[u8], at: usize) -> Result<ResponseLaw, TableError> {
-    let word = |field: Field| u32_at(bytes, at + field.start);
+    let mut words = [0; RESPONSE_LEN / WORD];
+    let part = bytes.get(at..).unwrap_or_default().as_chunks().0;
+    for (word, bytes) in words.iter_mut().zip(part) {
+        *word = u32::from_le_bytes(*bytes);
+    }
+    let word = |field: Field| words[field.start / WORD];
     let check = |ok: bool, field: Field| {
         if ok {
             Ok(())
@@ -27,7 +32,7 @@ pub(super) fn read_response(bytes: &[u8], at: usize) -> Result<ResponseLaw, Tabl
     let window_ticks = u16::try_from(word(response::WINDOW)).unwrap_or(u16::MAX);
     let law = ResponseLaw {
         droop_gain_ppm_per_hz: word(response::DROOP_GAIN),
-        setpoint_uhz: i32_at(bytes, at + response::SETPOINT.start),
+        setpoint_uhz: word(response::SETPOINT).cast_signed(),
         slope_gain_ppm_s_per_hz: word(response::SLOPE_GAIN),
         slope_threshold_uhz_per_s: word(response::SLOPE_THRESHOLD),
         window_ticks,

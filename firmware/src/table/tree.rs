@@ -28,88 +28,29 @@ pub const LEAF_AFFINE: u8 = 32;
 /// Most affine pieces of a tree.
 pub const AFFINE_PIECES_MAX: u8 = 31;
 
-/// A checked string of nodes; lookups end within [`NodesView::depth`] nodes.
+/// A checked string of nodes; lookups end within [`Shape::depth`] nodes.
 #[derive(Debug, Clone)]
 pub(super) struct NodesView<'t> {
     nodes: &'t [u8],
-    depth: u16,
-    leaves: u32,
+}
+
+/// What a tree has of nodes and leaves.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Shape {
+    /// Most nodes on the way to a leaf.
+    pub(super) depth: u16,
+    /// Leaves.
+    pub(super) leaves: u32,
 }
 
 impl<'t> NodesView<'t> {
     /// Checks that the bytes are one tree, that every subtree ends where its parent says, and that
     /// `leaf` accepts all leaves.
-    #[inline(never)]
-    pub(super) fn parse(nodes: &'t [u8], leaf: &dyn Fn(u8) -> bool) -> Result<Self, BlockError> {
-        if let [only] = nodes {
-            return if leaf(*only) {
-                Ok(Self {
-                    nodes,
-                    depth: 1,
-                    leaves: 1,
-                })
-            } else {
-                Err(BlockError::BadLevel)
-            };
-        }
-        let check = |ok| {
-            if ok {
-                Ok(())
-            } else {
-                Err(BlockError::BadLevel)
-            }
-        };
-        // Where the right children of the path's nodes begin, and their depth.
-        let mut pending = [(0usize, 0u16); TREE_DEPTH_MAX as usize];
-        let mut waiting = 0;
-        let (mut at, mut depth) = (0usize, 1u16);
-        let mut view = Self {
-            nodes,
-            depth: 1,
-            leaves: 0,
-        };
-        // Every turn consumes a node, so the loop ends.
-        loop {
-            if depth > TREE_DEPTH_MAX {
-                return Err(BlockError::TooManyVisits);
-            }
-            view.depth = view.depth.max(depth);
-            let (node, len) = Node::read(nodes, at).ok_or(BlockError::BadNode)?;
-            at += len;
-            match node.children {
-                Children::LeftLeaf(value) | Children::RightLeaf(value) => {
-                    check(leaf(value))?;
-                    view.leaves += 1;
-                }
-                Children::Nodes { skip } => {
-                    // At most one entry for each node of the path: there is room.
-                    if let Some(slot) = pending.get_mut(waiting) {
-                        *slot = (at + skip as usize, depth + 1);
-                    }
-                    waiting += 1;
-                }
-                Children::Leaves(left, right) => {
-                    check(leaf(left) && leaf(right))?;
-                    view.leaves += 2;
-                    if waiting == 0 {
-                        break;
-                    }
-                    waiting -= 1;
-                    let (expected, right_depth) = pending.get(waiting).copied().unwrap_or_default();
-                    if expected != at {
-                        return Err(BlockError::BadNode);
-                    }
-                    depth = right_depth;
-                    continue;
-                }
-            }
-            depth += 1;
-        }
-        if at == nodes.len() {
-            Ok(view)
-        } else {
-            Err(BlockError::BadShape)
-        }
+    pub(super) fn parse(
+        nodes: &'t [u8],
+        leaf: &dyn Fn(u8) -> bool,
+    ) -> Result<(Self, Shape), BlockError> {
+        Ok((Self { nodes }, check(nodes, leaf)?))
     }
 
     /// Leaf of a cell. `None` does not occur in a tree that was checked.
@@ -167,12 +108,78 @@ impl<'t> NodesView<'t> {
         nodes.first().copied()
     }
 
-    pub(super) fn depth(&self) -> u16 {
-        self.depth
+    /// The tree's shape, counted anew.
+    pub(super) fn shape(&self) -> Shape {
+        check(self.nodes, &|_| true).unwrap_or_default()
     }
+}
 
-    pub(super) fn leaves(&self) -> u32 {
-        self.leaves
+/// The shape of the tree in these bytes, if they are one tree, every subtree ends where its parent
+/// says, and `leaf` accepts all leaves.
+#[inline(never)]
+fn check(nodes: &[u8], leaf: &dyn Fn(u8) -> bool) -> Result<Shape, BlockError> {
+    let known = |ok| {
+        if ok {
+            Ok(())
+        } else {
+            Err(BlockError::BadLevel)
+        }
+    };
+    if let [only] = nodes {
+        known(leaf(*only))?;
+        return Ok(Shape {
+            depth: 1,
+            leaves: 1,
+        });
+    }
+    // Where the right children of the path's nodes begin, and their depth.
+    let mut begins = [0usize; TREE_DEPTH_MAX as usize];
+    let mut depths = [0u8; TREE_DEPTH_MAX as usize];
+    let mut waiting = 0;
+    let (mut at, mut depth) = (0usize, 1u8);
+    let mut shape = Shape::default();
+    // Every turn consumes a node, so the loop ends.
+    loop {
+        if u16::from(depth) > TREE_DEPTH_MAX {
+            return Err(BlockError::TooManyVisits);
+        }
+        shape.depth = shape.depth.max(depth.into());
+        let (node, len) = Node::read(nodes, at).ok_or(BlockError::BadNode)?;
+        at += len;
+        match node.children {
+            Children::LeftLeaf(value) | Children::RightLeaf(value) => {
+                known(leaf(value))?;
+                shape.leaves += 1;
+            }
+            Children::Nodes { skip } => {
+                // At most one entry for each node of the path: there is room.
+                if let (Some(begin), Some(below)) =
+                    (begins.get_mut(waiting), depths.get_mut(waiting))
+                {
+                    (*begin, *below) = (at + skip as usize, depth + 1);
+                }
+                waiting += 1;
+            }
+            Children::Leaves(left, right) => {
+                known(leaf(left) && leaf(right))?;
+                shape.leaves += 2;
+                if waiting == 0 {
+                    break;
+                }
+                waiting -= 1;
+                if begins.get(waiting) != Some(&at) {
+                    return Err(BlockError::BadNode);
+                }
+                depth = depths.get(waiting).copied().unwrap_or_default();
+                continue;
+            }
+        }
+        depth += 1;
+    }
+    if at == nodes.len() {
+        Ok(shape)
+    } else {
+        Err(BlockError::BadShape)
     }
 }
 
@@ -227,16 +234,17 @@ impl<'t> TreeView<'t> {
             None => leaf < levels,
             Some(piece) => piece < *count,
         };
+        let (nodes, _) = NodesView::parse(nodes, &exists)?;
         Ok(Self {
             pieces,
             levels,
-            nodes: NodesView::parse(nodes, &exists)?,
+            nodes,
         })
     }
 
     /// Most nodes that a lookup visits.
     pub fn depth(&self) -> u16 {
-        self.nodes.depth()
+        self.nodes.shape().depth
     }
 }
 
@@ -257,11 +265,11 @@ impl Encoding for TreeView<'_> {
     }
 
     fn worst_visits(&self) -> u16 {
-        self.nodes.depth()
+        self.depth()
     }
 
     fn entries(&self) -> u32 {
-        self.nodes.leaves()
+        self.nodes.shape().leaves
     }
 }
 
@@ -338,7 +346,7 @@ mod tests {
             cells in proptest::collection::vec(proptest::array::uniform4(prop_oneof![0u16..40, 0u16..3000]), 40),
         ) {
             let nodes = grow(&mut recipe.into_iter(), 9);
-            let view = NodesView::parse(&nodes, &|_| true).unwrap();
+            let (view, _) = NodesView::parse(&nodes, &|_| true).unwrap();
             for cell in cells {
                 let (leaf, visits) = slowly(&nodes, Cell(cell));
                 prop_assert_eq!(view.leaf(Cell(cell)), Some(leaf));

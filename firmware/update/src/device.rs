@@ -39,7 +39,7 @@ impl<K: Verify> Device<K> {
         self.is_for(container.header.class)?;
         let table = TableView::parse(container.table).map_err(Refusal::Table)?;
         let filter = Filter::new(self.filter_ticks);
-        let found = misfits(table.header(), &self.installation, self.meter, &filter);
+        let found = misfits(&table.header(), &self.installation, self.meter, &filter);
         if found.is_empty() {
             Ok(())
         } else {

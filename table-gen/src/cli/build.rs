@@ -228,7 +228,7 @@ fn encodings(table: &TableView<'_>, laws: &[CompressedLaw]) -> Vec<EncodingRepor
                 inputs_bytes: entry.inputs_len,
                 entries: view.encoding().entries(),
                 worst_visits: entry.worst_visits,
-                dense_bytes: dense_bytes(table.header()),
+                dense_bytes: dense_bytes(&table.header()),
                 domain_cells: report.map(|r| r.domain_cells),
                 worst_steps: report.map(|r| r.steps),
                 worst_steps_minimal: report.map(|r| r.steps_minimal),

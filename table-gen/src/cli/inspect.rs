@@ -101,7 +101,7 @@ pub(super) fn run(args: &InspectArgs) -> Result<(), Failure> {
             .into_iter()
             .filter_map(|law| inspect::survey(&table, law))
             .collect(),
-        response: table.response().map(ResponseReport::from),
+        response: table.response().as_ref().map(ResponseReport::from),
     };
     if args.output.json {
         output::json(&report)?;

@@ -92,7 +92,7 @@ pub(super) fn run(args: &ProbArgs) -> Result<(), Failure> {
     exported(args, &spec, &answer)?;
     if let Some(path) = &args.figure {
         let absolute = spec.uncertainty.participation_absolute;
-        let figure = prob_figure::figure(table.header(), absolute, &question, &answer);
+        let figure = prob_figure::figure(&table.header(), absolute, &question, &answer);
         let drawn = chart::svg(&figure).map_err(Failure::bad)?;
         write_one(path, chart::with_style(&drawn).as_bytes())?;
     }
@@ -167,7 +167,7 @@ pub(super) fn section(
     let bands = analysis::bands_of(spec, &question);
     let proofs = analysis::proofs(table, spec, &question, &bands, &bar).map_err(failure)?;
     let answer = analysis::answer(table, spec, &question, proofs, &bar).map_err(failure)?;
-    let section = prob_figure::section(spec, table.header(), &question, &answer);
+    let section = prob_figure::section(spec, &table.header(), &question, &answer);
     Ok(Some(section))
 }
 

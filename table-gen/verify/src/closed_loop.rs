@@ -130,7 +130,7 @@ pub(crate) fn micro(value: f64) -> Interval {
 
 /// The inputs of a table \[ppm\], by level.
 pub(super) fn commands(table: &TableView<'_>) -> impl Iterator<Item = u32> {
-    let header = *table.header();
+    let header = table.header();
     (0..header.levels).map(move |level| header.participation(level).ppm())
 }
 

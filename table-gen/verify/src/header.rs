@@ -15,7 +15,7 @@ use model::table_fields::{self, FieldError};
 /// well.
 pub(super) fn differences(table: &TableView<'_>, spec: &Spec) -> Vec<String> {
     let header = table.header();
-    let mut out = geometry(header, spec);
+    let mut out = geometry(&header, spec);
     if let Err(error) = numbers(table, spec, &mut out) {
         out.push(error.to_string());
     }

@@ -54,7 +54,7 @@ pub(super) fn claim(table: &TableView<'_>, spec: &Spec) -> Option<Claim> {
 
 fn compare(table: &TableView<'_>, product: &Product) -> Misfits {
     misfits(
-        table.header(),
+        &table.header(),
         &product.installation,
         product.meter,
         &Filter::new(ChargerConfig::DEFAULT.filter_ticks),

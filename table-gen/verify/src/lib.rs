@@ -137,9 +137,9 @@ pub fn verify_assuming(
     let spec = assumed;
     let header = table.header();
     let model = delayed_loop::closed_loop(&table, spec);
-    let regions = Regions::new(header, model.error);
+    let regions = Regions::new(&header, model.error);
     let [first, real, from] = [model.known.first, model.known.real, model.known.before]
-        .map(|error| Regions::new(header, error));
+        .map(|error| Regions::new(&header, error));
     let settle_ticks = (spec.requirements.settle_within_s / model.tick_s).floor() as u32;
     let [low, high] = spec.requirements.inner_hz;
     let inner = closed_loop::micro(low).join(closed_loop::micro(high));

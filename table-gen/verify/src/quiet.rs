@@ -23,7 +23,7 @@ const SPAN_MS: u64 = 300_000;
 /// The claim, where the spec makes it.
 pub(super) fn claim(table: &TableView<'_>, spec: &Spec) -> Option<Claim> {
     let limit = spec.requirements.changes_per_300_s?;
-    let most = changes_most(table.header()) as f64;
+    let most = changes_most(&table.header()) as f64;
     let reason = (most > limit).then(|| {
         format!("{most} is what the proof gives; `compare` counts the changes of runs, and proves nothing")
     });

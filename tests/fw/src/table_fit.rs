@@ -142,7 +142,7 @@ impl Candidate {
         })?;
         let filter = Filter::new(ChargerConfig::DEFAULT.filter_ticks);
         let (installation, meter) = (&built.product.installation, built.product.meter);
-        Ok(misfits(table.header(), installation, meter, &filter))
+        Ok(misfits(&table.header(), installation, meter, &filter))
     }
 
     /// The table, the spec that it was made from, and what is proven of it, for people.

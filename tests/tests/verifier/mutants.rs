@@ -55,7 +55,7 @@ fn decisions(bytes: &[u8], spec: &Spec, ticks: u32) -> Vec<(Phase, [u16; 4], u8)
 
 /// The table with another header; blocks and all else as they are.
 fn with_header(bytes: &[u8], change: impl FnOnce(&mut Header)) -> Vec<u8> {
-    let mut header = *TableView::parse(bytes).unwrap().header();
+    let mut header = TableView::parse(bytes).unwrap().header();
     change(&mut header);
     let mut image = write_header(&header).to_vec();
     image.extend_from_slice(&bytes[HEADER_LEN..]);

@@ -134,7 +134,7 @@ impl<'t> Chargers<'t> {
                 let observer = ObserverConfig::new(plant, tick_ms)?;
                 Responder::Table(Box::new((
                     ControlLoop::with_table(Ok((*table).clone())),
-                    Observer::at_rest(observer, plant, 0),
+                    Observer::at_rest(observer, 0),
                 )))
             }
         };

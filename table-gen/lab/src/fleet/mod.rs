@@ -172,7 +172,7 @@ pub fn run(
 /// What the proof of a table assumes of the fleet; `None` for a table by games, whose proof knows
 /// one participation.
 fn hull_config(spec: &Spec, table: &TableView<'_>) -> Option<HullConfig> {
-    let law = *table.response()?;
+    let law = table.response()?;
     let uncertainty = &spec.uncertainty;
     Some(HullConfig {
         law,

@@ -61,7 +61,7 @@ pub struct ClosedLoop<'t> {
     tick_step: Propagator,
     monitor: Monitor,
     firmware: ControlLoop<'t>,
-    observer: Option<(ObserverConfig, firmware::table::PlantParameters)>,
+    observer: Option<ObserverConfig>,
     /// Commands on their way, oldest at `at`.
     pending: Vec<f64>,
     at: usize,
@@ -85,7 +85,7 @@ impl<'t> ClosedLoop<'t> {
             Estimator::Observer => {
                 let config = ObserverConfig::new(&header.plant, header.tick_ms)
                     .map_err(LoopError::Observer)?;
-                Some((config, header.plant))
+                Some(config)
             }
         };
         Ok(Self {
@@ -140,9 +140,9 @@ impl<'t> ClosedLoop<'t> {
         self.pending.resize(whole + 1, 0.0);
         self.at = 0;
         self.firmware.reset();
-        let mut observer = self.observer.as_ref().map(|(config, parameters)| {
+        let mut observer = self.observer.as_ref().map(|config| {
             let f_uhz = measured(&grid.state()).frequency_uhz();
-            Observer::at_rest(*config, parameters, f_uhz)
+            Observer::at_rest(*config, f_uhz)
         });
         let mut chance = Chance::new(scenario);
         let mut monitor = self.monitor;

@@ -55,7 +55,7 @@ pub fn verify(
         claims.extend(not_examined(spec, reason));
         return Ok(unexamined(claims));
     }
-    let all = case(law, table, spec);
+    let all = case(&law, table, spec);
     if all.plant.known.fleet <= 0.0 || law.droop_gain_ppm_per_hz == 0 {
         claims.extend(not_examined(spec, "the law has no droop"));
         return Ok(unexamined(claims));
@@ -136,7 +136,7 @@ pub fn case_of(table: &TableView<'_>, spec: &Spec) -> Result<Case, VerifyError> 
         found: "laws by games".to_owned(),
         remedy: "a response is",
     })?;
-    Ok(case(law, table, spec))
+    Ok(case(&law, table, spec))
 }
 
 /// What the table assumes and the spec's grid.
