@@ -44,12 +44,14 @@
 //! E' = |Φ_δ| e + ∫ |exp(A σ) b| |d| dσ over [0, δ] + ρ
 //! ```
 //!
-//! of ξ, whatever is under way. Targets shrink and containment rises by E' of f, as they do by e
+//! of ξ, whatever is under way. Where the delay is a range, δ is its least, and the time under u
+//! begins with a changeover ([`crate::changeover`]). Targets shrink and containment rises by E' of f, as they do by e
 //! without a delay; the guard between the samples widens the cell by E'.
 
 use firmware::prediction::{MEASURED_MAX, PHI_FRACTION_BITS, RESPONSE_FRACTION_BITS};
 
 use crate::abstraction::affine::{Drift, Errors};
+use crate::changeover::Changeover;
 use crate::drives::{expected_power, measurement_micro, net_power};
 use model::flow::{
     Flow, Matrix, Vector, absolute_integral, absolute_integral_between, apply, largest,
@@ -86,7 +88,7 @@ impl Coefficients {
     }
 }
 
-/// The delay of a spec \[all in micro-units\].
+/// The delay of a spec, the least of a range \[all in micro-units\].
 #[derive(Debug, Clone)]
 pub struct Delay {
     /// Length in ticks of `sampling.watch_s`; not 0.
@@ -113,10 +115,10 @@ pub struct Delay {
 )]
 pub struct DelayError;
 
-/// Length of the delay \[ticks of `sampling.watch_s`\].
+/// Length of the delay over which the device predicts: the least \[ticks of `sampling.watch_s`\].
 pub fn ticks(spec: &Spec) -> u32 {
     spec.sampling
-        .ticks_of(spec.uncertainty.actuation_delay_s.most_s())
+        .ticks_of(spec.uncertainty.actuation_delay_s.least_s())
 }
 
 impl Delay {
@@ -165,10 +167,13 @@ impl Delay {
         }
         let effective = std::array::from_fn(|d| up(apart[d] + rounding[d]));
 
+        let changeover = Changeover::of(spec, possible.iter().copied());
         let own = delay_s < period_s;
         let shared_s = delay_s.min(period_s);
         let shared = Flow::over(&a, &b, shared_s);
-        let during = absolute_integral_between(&a, &b, (delay_s, period_s));
+        // The changeover adds its own part.
+        let own_until_s = changeover.as_ref().map_or(period_s, |change| change.rest_s);
+        let during = absolute_integral_between(&a, &b, (delay_s, own_until_s));
         let before = absolute_integral_between(&a, &b, (delay_s.max(period_s), later_s));
         let drifts = possible.iter().zip(&expected).map(|(possible, expected)| {
             let shift = Interval::point(possible.mid()) - *expected;
@@ -183,7 +188,11 @@ impl Delay {
                 };
                 up(during + up(before[d] * under_way))
             });
-            Drift { centre, radius }
+            let mut drift = Drift { centre, radius };
+            if let Some(changeover) = &changeover {
+                changeover.add_to(&mut drift, (&a, &b), period_s, *possible);
+            }
+            drift
         });
         let after = std::array::from_fn(|d| {
             up(times(&both.phi[d], &e) + up(times(&flow.phi[d], &e) + rounding[d]))

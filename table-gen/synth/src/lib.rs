@@ -8,6 +8,7 @@
 //! | [`game`] | an abstraction and a target | allowed inputs and ranks |
 //! | [`drives`], [`problem`] | a spec | everything derived from it, once |
 //! | [`delay`] | a delay of the commands | what the games know then, and the device's prediction |
+//! | [`changeover`] | a delay that is a range | what some chargers' old command does to a period |
 //! | [`checkpoint`] | a game | a file to go on from |
 //! | [`ranks`] | a game | slabs of it on several machines |
 //! | [`synthesis`] | a spec | the laws C1, C2, Hold |
@@ -23,6 +24,7 @@
 
 pub mod abstraction;
 pub mod budget;
+pub mod changeover;
 pub mod checkpoint;
 pub mod chosen;
 pub mod compress;

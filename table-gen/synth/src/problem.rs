@@ -10,6 +10,7 @@ use model::plant::{Plant, STATES};
 use model::spec::Spec;
 
 use crate::abstraction::affine::AffineInput;
+use crate::changeover::Changeover;
 use crate::delay::{Delay, DelayError};
 use crate::drives::{MICRO, measurement_micro, net_power};
 
@@ -32,8 +33,10 @@ pub struct Problem {
     pub period_s: f64,
     /// Bound of the estimate's error \[micro-units\].
     pub measurement: [f64; STATES],
-    /// The delay of the commands, if there is one.
+    /// The delay of the commands, if there is one: the least of a range.
     pub delay: Option<Delay>,
+    /// How every period begins where the delay is a range.
+    pub changeover: Option<Changeover>,
     /// Bound of the error of what the games know \[micro-units\]: the estimate's, or, with a delay,
     /// the prediction's.
     pub known_within: [f64; STATES],
@@ -71,7 +74,7 @@ impl Problem {
     /// A delay that the device cannot predict over.
     pub fn on_grid(spec: &Spec, grid: Grid) -> Result<Self, ProblemError> {
         let (a, b) = Plant::new(spec).matrices();
-        let inputs = (0..spec.input.levels())
+        let inputs: Vec<_> = (0..spec.input.levels())
             .map(|level| AffineInput {
                 a,
                 b,
@@ -79,6 +82,7 @@ impl Problem {
             })
             .collect();
         let delay = Delay::of(spec)?;
+        let changeover = Changeover::of(spec, inputs.iter().map(|input| input.drive));
         let measurement = measurement_micro(spec);
         let requirements = &spec.requirements;
         Ok(Self {
@@ -92,6 +96,7 @@ impl Problem {
             measurement,
             known_within: delay.as_ref().map_or(measurement, |delay| delay.effective),
             delay,
+            changeover,
             outer: requirements.outer_micro().map(f64::from),
             inner: requirements.inner_micro().map(f64::from),
             containment: requirements.containment_hz.map(containment_micro),

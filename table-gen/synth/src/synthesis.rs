@@ -9,7 +9,8 @@
 //! "Avoid" is every cell of which any part lies below containment. With a measurement error e, the
 //! cell is that of the estimate: the real frequency may lie e outside it, so bands shrink and
 //! containment rises by e. Where commands act with a delay, the cell is that of the prediction
-//! ([`crate::delay`]), and e that of the prediction.
+//! ([`crate::delay`]), and e that of the prediction. Where their delay is a range, every period
+//! begins with a changeover ([`crate::changeover`]).
 //!
 //! All numbers of the abstraction are in the device's micro-units, so that the edges of the cells
 //! are exact.
@@ -19,7 +20,9 @@ use std::time::Instant;
 use firmware::units::AXIS_F;
 
 use crate::abstraction::Abstraction;
-use crate::abstraction::affine::{AbstractionError, AffineAbstraction, Growth};
+use crate::abstraction::affine::{
+    AbstractionError, AffineAbstraction, AffineInput, Errors, Growth,
+};
 use crate::abstraction::guard::Guard;
 use crate::abstraction::tube::TubeGuard;
 use crate::game::bitset::BitSet;
@@ -116,11 +119,20 @@ pub fn abstraction(problem: &Problem) -> Result<AffineAbstraction<STATES>, Abstr
         Successor::ExactLinear => Growth::ExactLinear,
     };
     let (shape, inputs, period_s) = (problem.shape, &problem.inputs, problem.period_s);
-    let Some(delay) = &problem.delay else {
-        return AffineAbstraction::new(shape, inputs, period_s, growth, problem.measurement);
+    let plain = Errors {
+        before: problem.measurement,
+        after: problem.measurement,
     };
-    let drifts = Some(&delay.drifts[..]);
-    AffineAbstraction::with_drifts(shape, inputs, period_s, growth, delay.errors, drifts)
+    let at_once: Option<Vec<_>> = problem.changeover.as_ref().map(|changeover| {
+        let plant = (&problem.a, &problem.b);
+        let drift = |input: &AffineInput<STATES>| changeover.drift(plant, period_s, input.drive);
+        inputs.iter().map(drift).collect()
+    });
+    let (errors, drifts) = match &problem.delay {
+        Some(delay) => (delay.errors, Some(&delay.drifts[..])),
+        None => (plain, at_once.as_deref()),
+    };
+    AffineAbstraction::with_drifts(shape, inputs, period_s, growth, errors, drifts)
 }
 
 /// The guard of a band \[µHz\], if the spec asks for the time between the samples and the band has
@@ -129,10 +141,10 @@ fn between_samples(problem: &Problem, [low, high]: [f64; 2]) -> OptionalGuard {
     let bounded = low.is_finite() || high.is_finite();
     let guarded = problem.spec.method.between_samples && bounded;
     OptionalGuard(guarded.then(|| {
-        TubeGuard::new(
+        TubeGuard::with_changeover(
             &problem.shape,
             &problem.inputs,
-            problem.period_s,
+            (problem.period_s, problem.changeover.as_ref()),
             problem.known_within,
             AXIS_F,
             (low, high),

@@ -221,7 +221,11 @@ impl ClosedCells<'_> {
         drive: super::drive::Drive,
         batch: &mut Batch,
     ) {
-        let range = self.model.period.frequency(real, drive);
+        // A cell does not know the command before.
+        let range = match &self.model.changeover {
+            None => self.model.period.frequency(real, drive),
+            Some(changeover) => changeover.frequency(real, drive),
+        };
         batch.range = Some(batch.range.map_or(range, |all| all.join(range)));
         if self
             .model

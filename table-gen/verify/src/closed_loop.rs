@@ -7,10 +7,11 @@
 
 use firmware::table::TableView;
 
+use super::changeover::Changeover;
 use super::drive::Drive;
 use super::estimate_error::EstimateError;
 use super::held_input::HeldInput;
-use model::flow::{Matrix, Vector};
+use model::flow::{Matrix, Vector, absolute_integral_between};
 use model::interval::Interval;
 use model::plant::{Plant, STATES};
 use model::spec::Spec;
@@ -41,13 +42,15 @@ pub(crate) struct Model {
     pub(crate) period: HeldInput,
     /// Ticks of a period.
     pub(crate) period_ticks: u32,
+    /// How a period begins after a change of the command, where the delay is a range.
+    pub(crate) changeover: Option<Changeover>,
     /// What the device knows when it decides.
     pub(crate) known: EstimateError,
 }
 
 impl Model {
-    /// The closed loop of a table with a spec's plant and uncertainty, as if commands acted at
-    /// once.
+    /// The closed loop of a table with a spec's plant and uncertainty, as if commands began to act
+    /// at once: without the least delay.
     pub(super) fn without_delay(table: &TableView<'_>, spec: &Spec) -> Self {
         let header = table.header();
         let (a, b) = Plant::new(spec).matrices();
@@ -61,10 +64,28 @@ impl Model {
         let initial = &spec.uncertainty.initial;
         let error = spec.uncertainty.measurement.map(up_micro);
         let period = HeldInput::new(&a, &b, period_s);
+        let period_ms = u32::from(header.tick_ms) * period_ticks;
+        let (changeover, limit) = match Changeover::new(spec, (&a, &b), period_ms, &drives) {
+            Ok(changeover) => (changeover, None),
+            Err(reason) => (None, Some(reason)),
+        };
+        let mut known = match &changeover {
+            None => EstimateError::of_estimate(error, &period, &period.absolute, &drives),
+            Some(changeover) => {
+                let varied = absolute_integral_between(&a, &b, (0.0, changeover.rest_s()));
+                let mut known = EstimateError::of_estimate(error, &period, &varied, &drives);
+                for (effect, own) in known.drifts.iter_mut().zip(&drives) {
+                    changeover.replace(effect, (&a, &b), (own.mid, changeover.any.range()));
+                }
+                known
+            }
+        };
+        known.limit = limit;
         Self {
             a,
             b,
-            known: EstimateError::of_estimate(error, &period, &drives),
+            changeover,
+            known,
             drives,
             error,
             initial: std::array::from_fn(|d| {

@@ -24,6 +24,10 @@
 //!          - Φ_{δ+τ} ε + Φ_δ ε' + r'
 //! ```
 //!
+//! Where the delay is a range, δ is its least, and the time under the new command begins with a
+//! changeover ([`super::changeover`]): σ up to τ, less the changeover, is under the new command,
+//! the rest up to τ under a mean of it and any other.
+//!
 //! **ρ.** Each of the device's coefficients is compared with an enclosure of what it stands for.
 //! Their deviations count with the largest values that they can meet: 31 levels at most, and
 //! estimates of states within a period (or, right after the trigger, within δ) of where they are
@@ -39,6 +43,7 @@ use model::interval::Interval;
 use model::plant::STATES;
 use model::spec::Spec;
 
+use super::changeover::Changeover;
 use super::closed_loop::{MICRO, Model, commands, micro, not_linear};
 use super::drive::Drive;
 use super::estimate_error::{CommandDelay, EstimateError, PeriodEffect, up};
@@ -52,15 +57,18 @@ const RHO_MAX: f64 = 1e5;
 /// The closed loop of a table with a spec's plant and uncertainty.
 pub(crate) fn closed_loop(table: &TableView<'_>, spec: &Spec) -> Model {
     let mut model = Model::without_delay(table, spec);
+    let unexamined = model.known.limit.take();
     // What the grid does is the spec's, whatever the table predicts.
-    let late = spec
-        .sampling
-        .ticks_of(spec.uncertainty.actuation_delay_s.most_s());
+    let least_s = spec.uncertainty.actuation_delay_s.least_s();
+    let late = spec.sampling.ticks_of(least_s);
     if late > 0 {
         let expected: Vec<Interval> = commands(table)
             .map(|ppm| expected_power(spec, ppm))
             .collect();
         model.known = of_prediction(table, &model, &expected, late);
+    }
+    if let Some(reason) = unexamined {
+        model.known.limit = Some(reason);
     }
     let predicted = u32::from(table.header().delay_ticks);
     if predicted != late {
@@ -151,7 +159,11 @@ fn of_prediction(
 
     // Under the new command for σ in [δ, τ], if the delay is the shorter; under unknown ones for
     // the rest.
-    let own = absolute_integral_between(a, b, (delay_s, period_s));
+    let own_until_s = model
+        .changeover
+        .as_ref()
+        .map_or(period_s, Changeover::rest_s);
+    let own = absolute_integral_between(a, b, (delay_s, own_until_s));
     let others = absolute_integral_between(a, b, (delay_s.max(period_s), later_s));
     let shared = Flow::over(a, b, delay_s.min(period_s));
     let drifts = deviations
@@ -173,7 +185,12 @@ fn of_prediction(
                 let varied = up(up(own[d] * deviation.radius()) + up(others[d] * unknown));
                 up(errors + varied)
             });
-            PeriodEffect { centre, radius }
+            let mut effect = PeriodEffect { centre, radius };
+            if let Some(changeover) = &model.changeover {
+                let any = changeover.any.range() - *expected;
+                changeover.replace(&mut effect, (a, b), (deviation.mid(), any));
+            }
+            effect
         });
     EstimateError {
         first,

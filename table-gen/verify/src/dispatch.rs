@@ -68,15 +68,19 @@ pub(super) fn claim(spec: &Spec) -> Claim {
     }
 }
 
-/// Laws by games know one delay; a car that answers later, or anywhere within a time, is another.
+/// Laws by games know the delay of the spec alone; a car that answers later has another.
 fn late(spec: &Spec) -> Option<String> {
     let assumed = *spec.uncertainty.actuation_delay_s.ends_s();
     let found = spec.command_delay_s();
     (!spec.preference.always_on && found != assumed).then(|| {
+        let known = match spec.uncertainty.actuation_delay_s.exact_s() {
+            Some(exact) => format!("{exact} s alone"),
+            None => format!("{} to {} s", assumed[0], assumed[1]),
+        };
         format!(
             "a command acts after {} to {} s (charger.dead_time_s, ramp_s, pilot_change_s), and \
-             laws by games know {} s alone",
-            found[0], found[1], assumed[1]
+             laws by games know {known}",
+            found[0], found[1]
         )
     })
 }

@@ -52,14 +52,20 @@ pub(crate) struct EstimateError {
 }
 
 impl EstimateError {
-    /// Of a loop without a delay: the estimate's error \[micro-units\].
-    pub(crate) fn of_estimate(error: [f64; STATES], period: &HeldInput, drives: &[Drive]) -> Self {
+    /// Of a loop without a delay: the estimate's error \[micro-units\]. `varied` is what a unit of
+    /// varying net power adds over the time in which a level's own is certain.
+    pub(crate) fn of_estimate(
+        error: [f64; STATES],
+        period: &HeldInput,
+        varied: &[f64; STATES],
+        drives: &[Drive],
+    ) -> Self {
         let drifts = drives.iter().map(|drive| PeriodEffect {
             centre: period
                 .flow
                 .gamma
                 .map(|gamma| gamma * Interval::point(drive.mid)),
-            radius: std::array::from_fn(|d| up(up(period.absolute[d] * drive.radius) + error[d])),
+            radius: std::array::from_fn(|d| up(up(varied[d] * drive.radius) + error[d])),
         });
         Self {
             first: error,

@@ -131,7 +131,7 @@ fn geometry(header: &Header, spec: &Spec) -> Vec<String> {
         0
     } else {
         spec.sampling
-            .ticks_of(spec.uncertainty.actuation_delay_s.most_s())
+            .ticks_of(spec.uncertainty.actuation_delay_s.least_s())
     };
     same(
         "the delay [ticks]",

@@ -11,6 +11,7 @@
 //! | a stretch of time with a held input, and the frequency within it | `held_input` |
 //! | what the state that is decided on says of the real one | `estimate_error` |
 //! | the same where commands act late | `delayed_loop` |
+//! | a period whose first part is under two commands | `changeover` |
 //! | tight sets of states | `zonotope` |
 //! | the states on which the phase machine decides alike | `regions` |
 //! | the event at an unknown moment of a tick | `first_tick` |
@@ -52,6 +53,7 @@
 //! ```
 
 mod cellset;
+mod changeover;
 mod claims;
 mod closed_cells;
 mod closed_loop;

@@ -8,7 +8,8 @@
 //! Where commands act with a delay, a set after the trigger is that of the real states in which the
 //! tick's command begins to act: at the trigger the set flies over the delay with nothing acting,
 //! and from then on what is decided on lies within the prediction's error of it
-//! ([`super::estimate_error`]).
+//! ([`super::estimate_error`]). Where the delay is a range, that moment is the earliest; the set
+//! then flies under the old and the new command first ([`super::changeover`]).
 
 use std::collections::{BTreeMap, HashMap, HashSet};
 
@@ -16,13 +17,16 @@ use firmware::phase::{Decision, Phase, PhaseState};
 use firmware::table::TableView;
 use firmware::units::State;
 
+use super::changeover::mixed;
 use super::closed_loop::Model;
+use super::drive::Drive;
 use super::first_tick;
 use super::held_input::Linear;
 use super::outcome::{Outcome, Violation, missed_handover};
 use super::path::{PathStep, Traces};
 use super::regions::{Part, Regions};
 use super::zonotope::Zonotope;
+use model::interval::Interval;
 use model::plant::STATES;
 
 /// Most parts of a layer before they are merged.
@@ -291,10 +295,8 @@ impl<'a> TightSets<'a> {
         }
         let age = self.aged(tick, &one, trace);
         let (state, ticks) = run_out(self.table, one.next, one.part.representative);
-        let segment = self.model.held(ticks);
-        let range = segment.frequency(&one.part.set, drive);
+        let (range, set) = self.flight(&one, ticks, drive);
         self.tally.flown(self.model, range, trace, &self.traces);
-        let set = one.part.set.after(segment, drive);
         let node = Node {
             trace,
             state,
@@ -302,6 +304,24 @@ impl<'a> TightSets<'a> {
             set,
         };
         self.layers.entry(tick + ticks).or_default().push(node);
+    }
+
+    /// The frequencies until a part is looked at again, and the set then. A change of the command
+    /// that is held for a period begins with a changeover, if there is one.
+    fn flight(&mut self, one: &Decided, ticks: u32, drive: Drive) -> (Interval, Zonotope) {
+        let (set, model) = (&one.part.set, self.model);
+        let before = model.drives.get(usize::from(one.was.level));
+        if let (Some(changeover), Some(before)) = (&model.changeover, before)
+            && one.was.level != one.next.level
+        {
+            if ticks != model.period_ticks {
+                let what = "a command changes that is not held for a period".to_owned();
+                self.tally.limit.get_or_insert(what);
+            }
+            return changeover.period(set, mixed(*before, drive), drive);
+        }
+        let segment = model.held(ticks);
+        (segment.frequency(set, drive), set.after(segment, drive))
     }
 
     fn aged(&mut self, tick: u32, one: &Decided, trace: u32) -> Age {

@@ -30,6 +30,7 @@ fn decisions(bytes: &[u8], spec: &Spec, ticks: u32) -> Vec<(Phase, [u16; 4], u8)
         moment: 0.5,
         share: 0.0,
         error: 0.0,
+        early: 1.0,
     };
     let (mut out, mut state) = (Vec::new(), PhaseState::INITIAL);
     let mut first = true;

@@ -45,6 +45,8 @@ pub struct Constant {
     pub share: f64,
     /// The estimate's error within its bound, in \[-1, 1\].
     pub error: f64,
+    /// Share of the fleet that answers after the least delay, in \[0, 1\]; the rest after the most.
+    pub early: f64,
 }
 
 impl Adversary for Constant {
@@ -54,6 +56,10 @@ impl Adversary for Constant {
 
     fn tick(&mut self, _: &[f64; STATES]) -> (f64, [f64; STATES]) {
         (self.share, [self.error; STATES])
+    }
+
+    fn early(&mut self, _: &[f64; STATES]) -> f64 {
+        self.early
     }
 }
 
@@ -66,6 +72,8 @@ pub struct BangBang {
     pub hold_ticks: f64,
     /// Net power within its interval, in \[-1, 1\], until the first switch.
     pub share: f64,
+    /// Share of the fleet that answers after the least delay, until the first switch.
+    pub early: f64,
 }
 
 impl Adversary for BangBang {
@@ -80,6 +88,16 @@ impl Adversary for BangBang {
         }
         let error = std::array::from_fn(|_| self.random.sign());
         (self.share, error)
+    }
+
+    fn early(&mut self, _: &[f64; STATES]) -> f64 {
+        match self.random.number() % 8 {
+            0 => self.early = 0.0,
+            1 => self.early = 1.0,
+            2 => self.early = self.random.unit(),
+            _ => {}
+        }
+        self.early
     }
 }
 
@@ -126,19 +144,36 @@ impl Resonant {
     }
 }
 
+impl Resonant {
+    /// The functional that chooses.
+    fn above(&self, x: &[f64; STATES]) -> f64 {
+        // 1 Hz weighs as much as 5 GW: the governor's gain.
+        let scaled = 5.0 * self.direction[0] * x[0]
+            + self.direction[1] * x[1]
+            + self.direction[2] * x[2]
+            + self.direction[3] * x[3];
+        scaled - self.level
+    }
+}
+
 impl Adversary for Resonant {
     fn event(&mut self) -> ([f64; STATES], f64) {
         (self.corner, self.moment)
     }
 
     fn tick(&mut self, x: &[f64; STATES]) -> (f64, [f64; STATES]) {
-        // 1 Hz weighs as much as 5 GW: the governor's gain.
-        let scaled = 5.0 * self.direction[0] * x[0]
-            + self.direction[1] * x[1]
-            + self.direction[2] * x[2]
-            + self.direction[3] * x[3];
-        let share = (scaled - self.level).signum();
+        let share = self.above(x).signum();
         let error = std::array::from_fn(|_| self.random.sign());
         (share, error)
+    }
+
+    fn early(&mut self, x: &[f64; STATES]) -> f64 {
+        // With the power or against it: a bit of what was drawn once.
+        let with = (self.moment * 1024.0) as u64 & 1 == 0;
+        if (self.above(x) > 0.0) == with {
+            1.0
+        } else {
+            0.0
+        }
     }
 }

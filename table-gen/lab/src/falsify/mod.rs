@@ -7,14 +7,15 @@
 //! | module | holds |
 //! |---|---|
 //! | [`trajectory`] | plant and firmware, from the event until a claim breaks |
+//! | `under_way` | commands that act late, anywhere within a range of delays |
 //! | [`adversaries`] | who chooses the disturbances |
 //! | [`crowd`] | chargers with own clocks and errors; commands act anywhere within the delays |
 //! | `fleet` | the search against a whole fleet, on a plant and losses that are drawn |
 //! | [`witness`] | for a verdict's failure: a real trajectory that shows it |
 //!
-//! Where a spec knows a fleet (own clocks, a range of delays, a band of the plant's parameters, or
-//! a response), the search is `fleet`'s. Else one charger stands for all, and the search takes
-//! turns between three kinds of trajectory:
+//! Where a spec knows a fleet (own clocks, a band of the plant's parameters, or a response), the
+//! search is `fleet`'s. Else one charger decides for all, each follows after its own delay, and the
+//! search takes turns between three kinds of trajectory:
 //!
 //! | kind | chooses |
 //! |---|---|
@@ -29,6 +30,7 @@ pub mod crowd;
 mod fleet;
 mod found;
 pub mod trajectory;
+mod under_way;
 pub mod witness;
 
 use firmware::table::{TableError, TableView};
@@ -99,7 +101,6 @@ pub fn sample(
 fn knows_a_fleet(spec: &Spec) -> bool {
     let uncertainty = &spec.uncertainty;
     uncertainty.own_clocks
-        || uncertainty.actuation_delay_s.exact_s().is_none()
         || uncertainty.inertia_gw_s_per_hz.is_some()
         || uncertainty.governor_gain_gw_per_hz.is_some()
         || uncertainty.damping_gw_per_hz.is_some()
@@ -188,6 +189,7 @@ fn constant(draw: u64) -> Constant {
         moment: random.unit(),
         share: random.sign(),
         error: random.sign(),
+        early: share_early(&mut random),
     }
 }
 
@@ -199,5 +201,15 @@ fn bang_bang(draw: u64) -> BangBang {
         share: random.sign(),
         random,
         hold_ticks,
+        early: 1.0,
+    }
+}
+
+/// A fleet that answers early, late, or in two groups.
+fn share_early(random: &mut Random) -> f64 {
+    match random.number() % 3 {
+        0 => 0.0,
+        1 => 1.0,
+        _ => random.unit(),
     }
 }

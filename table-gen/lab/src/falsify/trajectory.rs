@@ -5,8 +5,6 @@
 //! its model does not hide itself here. A trajectory that breaks a claim by more than the
 //! arithmetic's error is a real counterexample, whatever the sets say.
 
-use std::collections::VecDeque;
-
 use firmware::control_loop::{ControlLoop, Source};
 use firmware::phase::Phase;
 use firmware::prediction::History;
@@ -16,6 +14,8 @@ use model::plant::{Plant, STATES};
 use model::propagator::Propagator;
 use model::spec::Spec;
 use model::verdict::ClaimName;
+
+use super::under_way::{Command, Lateness, Part, UnderWay};
 
 /// Pieces of a tick at which the frequency between ticks is looked at.
 const PIECES: usize = 5;
@@ -34,6 +34,10 @@ pub trait Adversary {
     /// estimate's error within its bound, both in \[-1, 1\]. The error goes into this tick's
     /// measurement, the power acts until the next.
     fn tick(&mut self, x: &[f64; STATES]) -> (f64, [f64; STATES]);
+    /// Where the delay is a range: the share of the fleet, in \[0, 1\], that follows the latest
+    /// command that a charger may follow in the tick that begins; the others follow the oldest. 1
+    /// is a fleet that answers after the least delay, 0 one that answers after the most.
+    fn early(&mut self, x: &[f64; STATES]) -> f64;
 }
 
 /// The loop as it stands at a tick.
@@ -64,29 +68,15 @@ pub struct Breach {
     pub tick: u32,
 }
 
-/// A command on its way to the power that it asks for.
-#[derive(Debug, Clone, Copy)]
-struct Command {
-    phase: Phase,
-    /// Share of the fleet, in \[0, 1\].
-    participation: f64,
-}
-
-impl Command {
-    const NONE: Self = Self {
-        phase: Phase::NoControl,
-        participation: 0.0,
-    };
-}
-
 /// A table on a spec's plant, prepared for many trajectories.
 pub struct Trajectories<'a> {
     table: &'a TableView<'a>,
     spec: &'a Spec,
     plant: Plant,
     tick_s: f64,
-    /// The plant over 1..=PIECES pieces of a tick.
-    pieces: Vec<Propagator>,
+    lateness: Lateness,
+    /// The plant over 1..=PIECES pieces of each part of a tick.
+    pieces: Vec<Vec<Propagator>>,
     settle_ticks: u32,
 }
 
@@ -95,15 +85,20 @@ impl<'a> Trajectories<'a> {
     pub fn new(table: &'a TableView<'a>, spec: &'a Spec) -> Self {
         let plant = Plant::new(spec);
         let tick_s = f64::from(spec.sampling.watch_ms()) / 1000.0;
-        let length_s = tick_s / PIECES as f64;
+        let lateness = Lateness::of(spec, tick_s);
+        let pieces = |part: &Part| {
+            let length_s = part.length_s / PIECES as f64;
+            (1..=PIECES)
+                .map(|n| Propagator::new(&plant, length_s * n as f64))
+                .collect()
+        };
         Self {
             table,
             spec,
             plant,
             tick_s,
-            pieces: (1..=PIECES)
-                .map(|n| Propagator::new(&plant, length_s * n as f64))
-                .collect(),
+            pieces: lateness.parts.iter().map(pieces).collect(),
+            lateness,
             settle_ticks: (spec.requirements.settle_within_s / tick_s).floor() as u32,
         }
     }
@@ -147,13 +142,9 @@ impl<'a> Trajectories<'a> {
             level: 0,
             acting: Phase::NoControl,
         });
-        let late = self
-            .spec
-            .sampling
-            .ticks_of(uncertainty.actuation_delay_s.most_s());
-        let mut under_way: VecDeque<Command> = (0..late).map(|_| Command::NONE).collect();
+        let mut under_way = UnderWay::new(&self.lateness);
         let (share, _) = adversary.tick(&x);
-        let power = self.net_power(Command::NONE, share);
+        let power = self.net_power(Command::NONE.participation, share);
         x = Propagator::new(&self.plant, offset_s).step(&x, power);
         let mut control = ControlLoop::with_table(Ok(self.table.clone()));
         // What the device predicts, for the claim that C1 hands over: the loop does not show it.
@@ -172,12 +163,11 @@ impl<'a> Trajectories<'a> {
             let action = control.step(measured);
             let state = control.phase_state();
             history.push(state.level);
-            under_way.push_back(Command {
+            under_way.note(Command {
                 phase: state.phase,
                 participation: f64::from(action.participation.ppm()) / MICRO,
             });
-            // As many as there are ticks of delay, and this one.
-            let acting = under_way.pop_front().unwrap_or(Command::NONE);
+            let acting = under_way.latest();
             see(&Sample {
                 time_s,
                 x,
@@ -209,14 +199,21 @@ impl<'a> Trajectories<'a> {
                 }
                 _ => since = None,
             }
-            let power = self.net_power(acting, share);
-            for piece in &self.pieces {
-                let f = piece.step(&x, power)[AXIS_F];
-                if let Some(claim) = self.broken(acting.phase, f) {
-                    return breach(claim, f);
+            let early = if self.lateness.is_range {
+                adversary.early(&x)
+            } else {
+                1.0
+            };
+            for (part, pieces) in self.lateness.parts.iter().zip(&self.pieces) {
+                let power = self.net_power(under_way.given(part, early), share);
+                for piece in pieces {
+                    let f = piece.step(&x, power)[AXIS_F];
+                    if let Some(claim) = self.broken(acting.phase, f) {
+                        return breach(claim, f);
+                    }
                 }
+                x = pieces.last().map_or(x, |part| part.step(&x, power));
             }
-            x = self.pieces.last().map_or(x, |tick| tick.step(&x, power));
         }
         None
     }
@@ -240,11 +237,11 @@ impl<'a> Trajectories<'a> {
     /// `P u' - w` \[GW\] at a point of its interval: u' within the participation error and what the
     /// hostile share gives or refuses, at most the whole fleet, w within its band; the ends are -1
     /// and 1.
-    fn net_power(&self, command: Command, share: f64) -> f64 {
+    fn net_power(&self, participation: f64, share: f64) -> f64 {
         let uncertainty = &self.spec.uncertainty;
         let error = uncertainty.participation;
         let hostile = uncertainty.hostile();
-        let honest = command.participation * (1.0 - hostile);
+        let honest = participation * (1.0 - hostile);
         let least = (honest * (1.0 - error)).max(0.0);
         let most = (honest * (1.0 + error) + hostile).min(1.0);
         let [loss_least, loss_most] = uncertainty.loss_gw;

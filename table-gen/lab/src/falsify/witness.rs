@@ -50,6 +50,7 @@ fn is_exact(spec: &Spec) -> bool {
     low == high
         && uncertainty.participation == 0.0
         && uncertainty.hostile() == 0.0
+        && uncertainty.actuation_delay_s.exact_s().is_some()
         && uncertainty.measurement == [0.0; STATES]
         && uncertainty.initial.lower == uncertainty.initial.upper
 }
@@ -71,6 +72,7 @@ fn find(
                     moment: n as f64 / count as f64,
                     share: 0.0,
                     error: 0.0,
+                    early: 1.0,
                 })
             };
             attempt(trajectories, claim, ticks, &make, "none")
@@ -82,12 +84,14 @@ fn find(
             moment: seed as f64 / TRIES as f64,
             share: 0.0,
             error: 0.0,
+            early: 0.5,
         };
         let constant = || constant(seed);
         let bang = || BangBang {
             random: Random::new(seed),
             hold_ticks: 1.0 + (seed % 64) as f64,
             share: 1.0,
+            early: 1.0,
         };
         let resonant = || Resonant::new(seed);
         let run = |make: &dyn Fn() -> Box<dyn Adversary>, name: &str| {
@@ -123,6 +127,7 @@ fn constant(seed: u64) -> Constant {
         moment: random.unit(),
         share: if bit(0) { 1.0 } else { -1.0 },
         error: if bit(1) { 1.0 } else { -1.0 },
+        early: if bit(6) { 1.0 } else { 0.0 },
     }
 }
 

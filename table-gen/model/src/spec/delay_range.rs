@@ -48,6 +48,12 @@ impl DelayRange {
         &self.ends_s
     }
 
+    /// The least \[s\].
+    #[must_use]
+    pub const fn least_s(&self) -> f64 {
+        self.ends_s[0]
+    }
+
     /// The most \[s\].
     #[must_use]
     pub const fn most_s(&self) -> f64 {
@@ -59,5 +65,15 @@ impl DelayRange {
     pub fn exact_s(&self) -> Option<f64> {
         let [least, most] = self.ends_s;
         (least == most).then_some(most)
+    }
+
+    /// Time from the least to the most \[ms\], rounded up; 0 where the delay is known.
+    ///
+    /// A millionth of a millisecond covers the decimal noise of ends that are whole milliseconds,
+    /// which a spec for games has.
+    #[must_use]
+    pub fn span_ms(&self) -> u32 {
+        let [least, most] = self.ends_s;
+        ((most - least) * 1e3 - 1e-6).ceil().max(0.0) as u32
     }
 }

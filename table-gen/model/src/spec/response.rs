@@ -140,10 +140,6 @@ fn check_games(spec: &Spec, origin: &Origin) -> Result<(), SpecError> {
             format!("{other}, or {is_response}"),
         ))
     };
-    if uncertainty.actuation_delay_s.exact_s().is_none() {
-        let found = format!("{:?} s", uncertainty.actuation_delay_s.ends_s());
-        return refuse("uncertainty.actuation_delay_s", found, "one number");
-    }
     let bands = [
         (
             "uncertainty.inertia_gw_s_per_hz",

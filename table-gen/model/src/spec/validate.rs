@@ -217,17 +217,34 @@ fn check_uncertainty(uncertainty: &UncertaintySpec, origin: &Origin) -> Result<(
     Ok(())
 }
 
-/// For laws by games the device remembers the commands of so many ticks.
+/// For laws by games the device remembers the commands of so many ticks, and predicts over the
+/// least delay. Every charger has followed a command when the next one is decided.
 fn check_delay(
     uncertainty: &UncertaintySpec,
     sampling: &SamplingSpec,
     origin: &Origin,
 ) -> Result<(), SpecError> {
-    // A range is a matter of `response`.
-    let Some(delay_s) = uncertainty.actuation_delay_s.exact_s() else {
-        return Ok(());
-    };
+    let key = "uncertainty.actuation_delay_s";
+    let range = uncertainty.actuation_delay_s;
     let watch_ms = sampling.watch_ms().max(1);
+    if range.exact_s().is_none() {
+        let most_ms = to_whole_ms(range.most_s());
+        if most_ms.is_none_or(|most_ms| most_ms > sampling.period_ms()) {
+            let found = format!(
+                "{:?} s, beside sampling.period_s = {} s",
+                range.ends_s(),
+                sampling.period_s
+            );
+            let allowed = format!(
+                "whole milliseconds and a most of at most one period, {} s: a law by games decides \
+                 when every charger has followed the command before; one number may be longer, and \
+                 so may a range for a response (preference.always_on = true)",
+                sampling.period_s
+            );
+            return Err(inconsistent(origin, key, found, allowed));
+        }
+    }
+    let delay_s = range.least_s();
     let whole = to_whole_ms(delay_s).is_some_and(|delay_ms| delay_ms % watch_ms == 0);
     let ticks = sampling.ticks_of(delay_s);
     let most = u32::from(DELAY_TICKS_MAX);
@@ -243,12 +260,11 @@ fn check_delay(
         "a whole number of watch ticks, at most {most}, such as {} s",
         f64::from(nearest_ms) / 1e3
     );
-    Err(inconsistent(
-        origin,
-        "uncertainty.actuation_delay_s",
-        found,
-        allowed,
-    ))
+    let allowed = match range.exact_s() {
+        Some(_) => allowed,
+        None => format!("as the least of a range {allowed}"),
+    };
+    Err(inconsistent(origin, key, found, allowed))
 }
 
 fn check_requirements(requirements: &RequirementsSpec, origin: &Origin) -> Result<(), SpecError> {

@@ -13,17 +13,31 @@
 //! - the drive's variation adds `r ∫₀ˢ |exp(A t) b| dt`, which only grows: its value at the later
 //!   cut covers the piece.
 //!
+//! **Changeover.** Where a period begins with a changeover of length w
+//! ([`crate::changeover`]), it is cut at w, too. Until then the drive is that of the changeover,
+//! with its own middle. From w on the drive's middle is the input's, and the state at w, wherever
+//! in its set it is, is again the start of a smooth flow: the chord holds for it, and `x''` is
+//! bounded from the set widened by what has varied until w. At a cut s >= w
+//!
+//! - the middle's part is `Γ(s) m_u + (Γ(s) - Γ(s-w)) (m - m_u)`, m the changeover's middle;
+//! - what varied in the changeover adds `r ∫ |exp(A t) b| dt` over `[s-w, s]`;
+//! - what has varied since adds `r_u ∫ |exp(A t) b| dt` over `[0, s-w]`, taken at the later cut.
+//!
 //! **Rounding.** Coefficients are intervals whose radii are multiplied by the largest value they
 //! meet and added to the radius; sums run in f64 over at most D + 2 terms, each below 2^40, so
-//! their rounding is below 2^-10 of a unit, which `SUM_SLACK` covers.
+//! their rounding is below 2^-10 of a unit, which `SUM_SLACK` covers. So does it what the cuts, as
+//! rounded times, may miss of the changeover's or the period's end: a few 1e-16 s.
 
 use super::affine::AffineInput;
 use crate::abstraction::guard::Guard;
-use model::flow::{Flow, absolute_integral, apply, product, tube};
+use crate::changeover::Changeover;
+use model::flow::{
+    Flow, Matrix, Vector, absolute_integral, absolute_integral_between, apply, product, tube,
+};
 use model::grid_shape::GridShape;
 use model::interval::Interval;
 
-/// Cuts of the period.
+/// Cuts of the period; of a changeover as many as its share of the period, and one at least.
 const PIECES: usize = 32;
 /// Covers the rounding of the sums at run time \[plant units, which are micro-units for the
 /// charger's plant\].
@@ -46,6 +60,120 @@ pub struct TubeGuard<const D: usize> {
     cuts: Vec<Cut<D>>,
 }
 
+/// The period, cut.
+#[derive(Debug, Clone, Copy)]
+struct Course<'a> {
+    changeover: Option<&'a Changeover>,
+    /// Pieces of the changeover, and their length \[s\].
+    early: (usize, f64),
+    /// Pieces of the rest, and their length \[s\].
+    late: (usize, f64),
+}
+
+impl<'a> Course<'a> {
+    fn new(period_s: f64, changeover: Option<&'a Changeover>) -> Self {
+        let Some(change) = changeover else {
+            return Self {
+                changeover,
+                early: (0, 0.0),
+                late: (PIECES, period_s / PIECES as f64),
+            };
+        };
+        let share = (change.length_s / period_s * PIECES as f64).ceil();
+        let early = (share as usize).clamp(1, PIECES);
+        let late = if change.rest_s > 0.0 { PIECES } else { 0 };
+        Self {
+            changeover,
+            early: (early, change.length_s / early as f64),
+            late: (late, change.rest_s / late.max(1) as f64),
+        }
+    }
+
+    /// Length of the changeover \[s\].
+    fn changed_s(&self) -> f64 {
+        self.changeover.map_or(0.0, |change| change.length_s)
+    }
+
+    /// What an input's drive adds to a state on an axis at a cut \[s\], as centre and radius; the
+    /// radius holds until the later cut.
+    fn driven<const D: usize>(
+        &self,
+        (a, b): (&Matrix<D>, &Vector<D>),
+        axis: usize,
+        (time_s, later_s): (f64, f64),
+    ) -> Driven {
+        let flow = |time_s: f64| {
+            if time_s == 0.0 {
+                Flow::identity()
+            } else {
+                Flow::over(a, b, time_s)
+            }
+        };
+        let whole = flow(time_s).gamma[axis];
+        let changed_s = self.changed_s();
+        let Some(change) = self.changeover else {
+            let own_varied = absolute_integral(a, b, later_s.next_up())[axis];
+            return Driven {
+                changed: (Interval::ZERO, Interval::ZERO),
+                varied: 0.0,
+                own: whole,
+                own_varied,
+            };
+        };
+        let middle = Interval::point(change.drive.mid());
+        // The rounded difference must not fall short.
+        let since_s = (time_s - changed_s).max(0.0);
+        if time_s < changed_s {
+            return Driven {
+                changed: (whole * middle, whole),
+                varied: up(absolute_integral(a, b, later_s.next_up())[axis] * change.drive.radius()),
+                own: whole,
+                own_varied: 0.0,
+            };
+        }
+        let kept = whole - flow(since_s).gamma[axis];
+        let varied = absolute_integral_between(a, b, (since_s, time_s.next_up()))[axis];
+        let later_s = (later_s - changed_s).max(0.0).next_up();
+        Driven {
+            changed: (kept * middle, kept),
+            varied: up(varied * change.drive.radius()),
+            own: whole,
+            own_varied: absolute_integral(a, b, later_s)[axis],
+        }
+    }
+
+    /// The cuts \[s\], each with the one after it; the last with itself.
+    fn cuts(&self) -> Vec<(f64, f64)> {
+        let mut cuts = Vec::with_capacity(self.early.0 + self.late.0 + 1);
+        let (early, h) = self.early;
+        let changed_s = self.changed_s();
+        for piece in 0..early {
+            let later_s = if piece + 1 == early {
+                changed_s
+            } else {
+                h * (piece + 1) as f64
+            };
+            cuts.push((h * piece as f64, later_s));
+        }
+        let (late, h) = self.late;
+        let at = |piece: usize| changed_s + h * piece as f64;
+        cuts.extend((0..=late).map(|piece| (at(piece), at((piece + 1).min(late)))));
+        cuts
+    }
+}
+
+/// What the drives add at a cut.
+struct Driven {
+    /// Of the changeover's middle, and how much of an input's own middle it takes the place of.
+    changed: (Interval, Interval),
+    /// Radius of what varied in the changeover.
+    varied: f64,
+    /// Γ(s): times an input's middle.
+    own: Interval,
+    /// Times an input's radius.
+    own_varied: f64,
+}
+
 impl<const D: usize> TubeGuard<D> {
     /// A guard for an axis and a band \[plant units\]; the inputs must share one mode (one A and
     /// b).
@@ -55,22 +183,31 @@ impl<const D: usize> TubeGuard<D> {
         period_s: f64,
         measurement: [f64; D],
         axis: usize,
+        band: (f64, f64),
+    ) -> Self {
+        Self::with_changeover(shape, inputs, (period_s, None), measurement, axis, band)
+    }
+
+    /// The same for a period that begins with a changeover from any input.
+    pub fn with_changeover(
+        shape: &GridShape<D>,
+        inputs: &[AffineInput<D>],
+        (period_s, changeover): (f64, Option<&Changeover>),
+        measurement: [f64; D],
+        axis: usize,
         (low, high): (f64, f64),
     ) -> Self {
         let (a, b) = (inputs[0].a, inputs[0].b);
-        let h = period_s / PIECES as f64;
-        let bend = bend(shape, inputs, measurement, axis, h) * h * h / 8.0;
-        let mut cuts = Vec::with_capacity(PIECES + 1);
-        for piece in 0..=PIECES {
-            let time_s = h * piece as f64;
-            let flow = if piece == 0 {
+        let course = Course::new(period_s, changeover);
+        let bend = bend(shape, inputs, measurement, axis, &course);
+        let mut cuts = Vec::with_capacity(2 * PIECES + 1);
+        for (time_s, later_s) in course.cuts() {
+            let flow = if time_s == 0.0 {
                 Flow::identity()
             } else {
                 Flow::over(&a, &b, time_s)
             };
-            // The variation at the later cut covers the piece that begins here.
-            let later_s = (h * (piece + 1).min(PIECES) as f64).next_up();
-            let varied = absolute_integral(&a, &b, later_s)[axis];
+            let driven = course.driven((&a, &b), axis, (time_s, later_s));
             let row = flow.phi[axis];
             let mut radius = bend.next_up() + SUM_SLACK;
             let mut constant = Interval::ZERO;
@@ -90,11 +227,17 @@ impl<const D: usize> TubeGuard<D> {
             let offsets = inputs
                 .iter()
                 .map(|input| {
-                    let driven = constant + flow.gamma[axis] * Interval::point(input.drive.mid());
-                    let spread = radius + (varied * input.drive.radius()).next_up();
+                    let middle = Interval::point(input.drive.mid());
+                    let mut centre = constant + driven.own * middle;
+                    let mut spread = radius + (driven.own_varied * input.drive.radius()).next_up();
+                    if course.changeover.is_some() {
+                        let (changed, instead) = driven.changed;
+                        centre = centre + (changed - instead * middle);
+                        spread = up(spread + driven.varied);
+                    }
                     (
-                        (driven.low - spread).next_down(),
-                        (driven.high + spread).next_up(),
+                        (centre.low - spread).next_down(),
+                        (centre.high + spread).next_up(),
                     )
                 })
                 .collect();
@@ -104,15 +247,15 @@ impl<const D: usize> TubeGuard<D> {
     }
 }
 
-/// Bound of `|x''|` on an axis over a period from anywhere in the grid widened by the error, for
-/// inputs held at the middle of their drive: `x'' = A (A x + b v)`, with x enclosed piece by piece
-/// by `exp(A [0, h]) x_i + Γ([0, h]) v`.
+/// Bound of `h²/8 |x''|` on an axis over a period from anywhere in the grid widened by the error,
+/// for drives held at their middles: `x'' = A (A x + b v)`, with x enclosed piece by piece by
+/// `exp(A [0, h]) x_i + Γ([0, h]) v`.
 fn bend<const D: usize>(
     shape: &GridShape<D>,
     inputs: &[AffineInput<D>],
     measurement: [f64; D],
     axis: usize,
-    h: f64,
+    course: &Course<'_>,
 ) -> f64 {
     let start: [Interval; D] = std::array::from_fn(|d| {
         let low = Interval::point(shape.lower[d]);
@@ -122,27 +265,80 @@ fn bend<const D: usize>(
         (low - error).join(high + error)
     });
     let (a, b) = (inputs[0].a, inputs[0].b);
-    let square = product(&a, &a);
-    let driven = apply(&a, &b)[axis];
-    let within = tube(&a, h);
-    let step = Flow::over(&a, &b, h);
-    let unit = Interval { low: 0.0, high: h };
-    let mut largest = 0.0f64;
-    for input in inputs {
-        let v = Interval::point(input.drive.mid());
-        let mut state = start;
-        for _ in 0..PIECES {
-            let (free, forced) = (apply(&within, &state), apply(&within, &b));
-            let mut second = driven * v;
-            for d in 0..D {
-                second = second + square[axis][d] * (free[d] + forced[d] * unit * v);
-            }
-            largest = largest.max(second.magnitude());
-            let next = apply(&step.phi, &state);
-            state = std::array::from_fn(|d| next[d] + step.gamma[d] * v);
+    let (pieces, h) = course.late;
+    let rest = Stretch::new((&a, &b), axis, h);
+    let Some(change) = course.changeover else {
+        let bends = inputs
+            .iter()
+            .map(|input| rest.bend(start, input.drive.mid(), pieces).0);
+        return bends.fold(0.0, f64::max) * h * h / 8.0;
+    };
+    let (early, early_h) = course.early;
+    let changing = Stretch::new((&a, &b), axis, early_h);
+    let (first, at_end) = changing.bend(start, change.drive.mid(), early);
+    let varied = absolute_integral(&a, &b, change.length_s.next_up());
+    let from = std::array::from_fn(|d| {
+        let varied = up(varied[d] * change.drive.radius());
+        at_end[d] + Interval::point(varied).symmetric()
+    });
+    let later = inputs
+        .iter()
+        .map(|input| rest.bend(from, input.drive.mid(), pieces).0)
+        .fold(0.0, f64::max);
+    // Pieces are as long as their number says but for roundings.
+    let eighth = |h: f64| h * h / 8.0 * (1.0 + 1e-9);
+    up(first * eighth(early_h)).max(up(later * eighth(h)))
+}
+
+/// Pieces of one length, for [`bend`].
+struct Stretch<const D: usize> {
+    axis: usize,
+    a: Matrix<D>,
+    b: Vector<D>,
+    h: f64,
+    step: Flow<D>,
+}
+
+impl<const D: usize> Stretch<D> {
+    fn new((a, b): (&Matrix<D>, &Vector<D>), axis: usize, h: f64) -> Self {
+        Self {
+            axis,
+            a: *a,
+            b: *b,
+            h,
+            step: Flow::over(a, b, h),
         }
     }
-    largest
+
+    /// Bound of `|x''|` over so many pieces from a box under a constant drive, and the box at the
+    /// end.
+    fn bend(&self, start: [Interval; D], drive: f64, pieces: usize) -> (f64, [Interval; D]) {
+        let square = product(&self.a, &self.a);
+        let driven = apply(&self.a, &self.b)[self.axis];
+        let within = tube(&self.a, self.h);
+        let unit = Interval {
+            low: 0.0,
+            high: self.h,
+        };
+        let v = Interval::point(drive);
+        let mut largest = 0.0f64;
+        let mut state = start;
+        for _ in 0..pieces {
+            let (free, forced) = (apply(&within, &state), apply(&within, &self.b));
+            let mut second = driven * v;
+            for d in 0..D {
+                second = second + square[self.axis][d] * (free[d] + forced[d] * unit * v);
+            }
+            largest = largest.max(second.magnitude());
+            let next = apply(&self.step.phi, &state);
+            state = std::array::from_fn(|d| next[d] + self.step.gamma[d] * v);
+        }
+        (largest, state)
+    }
+}
+
+fn up(value: f64) -> f64 {
+    value.next_up()
 }
 
 impl<const D: usize> Guard<D> for TubeGuard<D> {

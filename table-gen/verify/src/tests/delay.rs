@@ -32,7 +32,7 @@ const DELAYED: [&str; 9] = [
     "requirements.inner_hz=[-0.4,0.2]",
 ];
 
-fn delayed(more: &[&str]) -> Spec {
+pub(super) fn delayed(more: &[&str]) -> Spec {
     let all: Vec<String> = DELAYED
         .iter()
         .chain(more)
@@ -42,13 +42,13 @@ fn delayed(more: &[&str]) -> Spec {
 }
 
 /// A table of head and no laws.
-fn bare(spec: &Spec) -> Vec<u8> {
+pub(super) fn bare(spec: &Spec) -> Vec<u8> {
     let none: [Option<emit::EncodedLaw>; LAWS] = [None, None, None];
     emit::assemble(emit::head(&Problem::new(spec).unwrap()).unwrap(), &none).unwrap()
 }
 
 /// In [-1, 1], an end half of the time.
-fn extreme(random: &mut Random) -> f64 {
+pub(super) fn extreme(random: &mut Random) -> f64 {
     if random.sign() > 0.0 {
         random.sign()
     } else {
@@ -56,7 +56,7 @@ fn extreme(random: &mut Random) -> f64 {
     }
 }
 
-fn level(random: &mut Random, spec: &Spec) -> u8 {
+pub(super) fn level(random: &mut Random, spec: &Spec) -> u8 {
     let last = spec.input.levels() as f64 - 1.0;
     ((0.5 + 0.5 * extreme(random)) * last).round() as u8
 }
@@ -64,7 +64,7 @@ fn level(random: &mut Random, spec: &Spec) -> u8 {
 /// The plant over a tick by fourth-order Runge-Kutta steps of at most 2 ms, states and power in
 /// micro-units. The fastest mode is 2/s, so a step errs by (0.004)^5 / 120, relatively, and 6.4 s
 /// by less than 1e-10: below a thousandth of a micro-unit for states of a few units.
-fn fly(plant: &Plant, mut x: [f64; STATES], power: f64, tick_s: f64) -> [f64; STATES] {
+pub(super) fn fly(plant: &Plant, mut x: [f64; STATES], power: f64, tick_s: f64) -> [f64; STATES] {
     let steps = (tick_s / 0.002).ceil();
     let h = tick_s / steps;
     for _ in 0..steps as u32 {
@@ -78,11 +78,12 @@ fn fly(plant: &Plant, mut x: [f64; STATES], power: f64, tick_s: f64) -> [f64; ST
     x
 }
 
+pub(super) fn load(name: &str, set: &[&str]) -> Spec {
+    let set: Vec<String> = set.iter().map(|s| (*s).to_owned()).collect();
+    Spec::load(name, &set).unwrap()
+}
+
 fn specs() -> Vec<Spec> {
-    let load = |name: &str, set: &[&str]| {
-        let set: Vec<String> = set.iter().map(|s| (*s).to_owned()).collect();
-        Spec::load(name, &set).unwrap()
-    };
     vec![
         delayed(&[]),
         delayed(&["uncertainty.actuation_delay_s=0.1", "input.step=0.1"]),

@@ -2,6 +2,7 @@
 //! verdicts are tested in the package `tests`.
 
 mod delay;
+mod delay_range;
 mod tube;
 
 use rand::{Rng, SeedableRng};

@@ -207,7 +207,6 @@ fn response(more: &[&str]) -> Vec<String> {
 #[test]
 fn what_games_do_not_cover_is_refused_by_its_key_and_taken_for_a_response() {
     let only_responses = [
-        "uncertainty.actuation_delay_s=[0.1, 0.5]",
         "uncertainty.inertia_gw_s_per_hz=[2.04, 5]",
         "uncertainty.governor_gain_gw_per_hz=[-5, -4]",
         "uncertainty.damping_gw_per_hz=[0.8, 1]",
@@ -222,6 +221,8 @@ fn what_games_do_not_cover_is_refused_by_its_key_and_taken_for_a_response() {
         assert!(message.contains("preference.always_on"), "{message}");
         Spec::load("paper-bi", &response(&[option])).unwrap();
     }
+    // A range of delays up to a period.
+    with(&["uncertainty.actuation_delay_s=[0.1, 0.5]"]).unwrap();
     // Games cover any loss in the band, so the gentler profiles too.
     with(&["uncertainty.loss_profile=constant"]).unwrap();
     // A response need not predict, so its delay need not be whole ticks.
@@ -329,4 +330,21 @@ fn inertia_that_goes_with_the_loss_leaves_some() {
         &["uncertainty.inertia_lost_s_per_hz=0.1"],
         "uncertainty.inertia_lost_s_per_hz",
     );
+}
+
+#[test]
+fn a_range_of_delays_for_games_ends_within_a_period_and_begins_at_a_tick() {
+    let key = "uncertainty.actuation_delay_s";
+    // The paper's period is 1.5 s, its tick 0.1 s.
+    with(&["uncertainty.actuation_delay_s=[0, 1.5]"]).unwrap();
+    with(&["uncertainty.actuation_delay_s=[0.1, 0.123]"]).unwrap();
+    for option in ["[0.1, 1.6]", "[0.1, 0.1234]"] {
+        let set = format!("{key}={option}");
+        let message = refused(&[&set], key);
+        assert!(message.contains("sampling.period_s = 1.5 s"), "{message}");
+        assert!(message.contains("preference.always_on"), "{message}");
+        Spec::load("paper-bi", &response(&[&set])).unwrap();
+    }
+    let message = refused(&["uncertainty.actuation_delay_s=[0.15, 0.3]"], key);
+    assert!(message.contains("as the least of a range"), "{message}");
 }
