@@ -109,3 +109,23 @@ fn the_papers_table_is_proven_with_half_a_second() {
         "{lowest} {nearest}"
     );
 }
+
+/// Each charger follows after a delay of its own, anywhere within 0.1 to 0.5 s and changing.
+#[test]
+fn a_table_for_a_range_of_delays_is_proven_and_stands() {
+    let key = "uncertainty.actuation_delay_s";
+    let spec = delayed(&[&format!("{key}=[0.1,0.5]")]);
+    let bytes = dense_of(&spec);
+    let verdict = judge(&bytes, &spec);
+    assert!(verdict.verified, "{:#?}", verdict.claims);
+    let stands = falsify(&bytes, &spec, 200_000, 1).unwrap();
+    assert_eq!(stands.violation, None);
+    // With the most that a period allows, the same table is not proven.
+    let longer = delayed(&[&format!("{key}=[0.1,2]")]);
+    let verdict = judge(&bytes, &longer);
+    assert!(!verdict.claim(ClaimName::Header).unwrap().holds);
+    assert!(!verdict.claim(ClaimName::Stay).unwrap().holds);
+    // And a real fleet breaks it.
+    let falls = falsify(&bytes, &longer, 1_000_000, 1).unwrap();
+    assert!(falls.violation.is_some(), "{falls:?}");
+}

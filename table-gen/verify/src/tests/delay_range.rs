@@ -7,7 +7,8 @@ use firmware::table::TableView;
 use firmware::units::{AXIS_F, State};
 
 use super::Random;
-use super::delay::{bare, delayed, extreme, fly, level, load};
+use super::delay::{bare, delayed, extreme, level, load};
+use super::late_fleet::{Fleet, Run, STYLES};
 use crate::changeover::mixed;
 use crate::closed_loop::Model;
 use crate::delayed_loop::closed_loop;
@@ -23,10 +24,6 @@ use synth::delay::{self, Delay};
 use synth::problem::Problem;
 use synth::synthesis;
 
-/// Parts of a tick in which nobody changes over.
-const PARTS: u32 = 10;
-/// Most chargers of a fleet.
-const CHARGERS_MAX: f64 = 200.0;
 /// Trials of a spec.
 const TRIALS: u32 = 240;
 /// Every so many trials the guard between the samples is built, which takes long.
@@ -54,142 +51,6 @@ fn specs() -> Vec<Spec> {
     ]
 }
 
-/// How a fleet's chargers come by their delays.
-#[derive(Debug, Clone, Copy, PartialEq)]
-enum Style {
-    Early,
-    Late,
-    /// A share of them early, the others late.
-    Groups,
-    /// Each its own, for good.
-    Own,
-    /// Each its own, another one in every part of a tick.
-    Changing,
-    /// All early or all late, changing together at random moments.
-    Together,
-}
-
-const STYLES: [Style; 6] = [
-    Style::Early,
-    Style::Late,
-    Style::Groups,
-    Style::Own,
-    Style::Changing,
-    Style::Together,
-];
-
-/// Chargers with delays within `[least, most]`.
-struct Fleet {
-    style: Style,
-    ends_s: [f64; 2],
-    delays_s: Vec<f64>,
-}
-
-impl Fleet {
-    fn new(random: &mut Random, style: Style, ends_s: [f64; 2]) -> Self {
-        let chargers = 1 + (random.unit() * CHARGERS_MAX) as usize;
-        let share = random.unit();
-        let [least, most] = ends_s;
-        let delays_s = (0..chargers)
-            .map(|_| match style {
-                Style::Early => least,
-                Style::Late => most,
-                Style::Groups if random.unit() < share => least,
-                Style::Groups => most,
-                _ => least + random.unit() * (most - least),
-            })
-            .collect();
-        Self {
-            style,
-            ends_s,
-            delays_s,
-        }
-    }
-
-    /// Share of the fleet that follows a command in a part of a tick that begins so long after its
-    /// decision. A charger whose delay ends within the part may follow from its beginning, if all
-    /// of the part is within the range; one with the most follows from the first part that reaches
-    /// past it.
-    fn following(&mut self, random: &mut Random, since_s: f64, part_s: f64) -> f64 {
-        const ROUNDING_S: f64 = 1e-9;
-        let [least, most] = self.ends_s;
-        if since_s < least - ROUNDING_S {
-            return 0.0;
-        }
-        if since_s + part_s > most + ROUNDING_S {
-            return 1.0;
-        }
-        match self.style {
-            Style::Changing => {
-                for delay_s in &mut self.delays_s {
-                    *delay_s = least + random.unit() * (most - least);
-                }
-            }
-            Style::Together if random.unit() < 0.3 => {
-                let same = if random.sign() > 0.0 { least } else { most };
-                self.delays_s.fill(same);
-            }
-            _ => {}
-        }
-        let follow = self.delays_s.iter().filter(|delay| **delay <= since_s);
-        follow.count() as f64 / self.delays_s.len() as f64
-    }
-}
-
-/// A loop in mid-event: a command was decided a period ago, and another one is now.
-struct Run<'a> {
-    spec: &'a Spec,
-    plant: Plant,
-    fleet: Fleet,
-    x: [f64; STATES],
-    /// Errors of participation and loss, in \[-1, 1\], and the mean ticks for which they are kept.
-    errors: [f64; 2],
-    pace: f64,
-    /// f at the ends of all parts since it was emptied \[µHz\].
-    f: Vec<f64>,
-}
-
-impl Run<'_> {
-    fn measured(&self, random: &mut Random) -> State {
-        let e = self.spec.uncertainty.measurement;
-        State(std::array::from_fn(|d| {
-            (self.x[d] + e[d] * 1e6 * extreme(random)).floor() as i32
-        }))
-    }
-
-    /// A tick that begins so long after the decision of `new`; the others still follow `old`.
-    fn tick(&mut self, random: &mut Random, since_s: f64, [old, new]: [u8; 2]) {
-        if random.unit() * self.pace < 1.0 {
-            self.errors = [extreme(random), extreme(random)];
-        }
-        let uncertainty = &self.spec.uncertainty;
-        let part_s = f64::from(self.spec.sampling.watch_ms()) / 1000.0 / f64::from(PARTS);
-        let delivered = |level: u8| {
-            let u = self.spec.input.value(level.into());
-            (u * (1.0 + uncertainty.participation * self.errors[0])).min(1.0)
-        };
-        let [low, high] = uncertainty.loss_gw;
-        let loss = 0.5 * (low + high) + 0.5 * (high - low) * self.errors[1];
-        for part in 0..PARTS {
-            let at_s = since_s + part_s * f64::from(part);
-            let share = self.fleet.following(random, at_s, part_s);
-            let mean = share * delivered(new) + (1.0 - share) * delivered(old);
-            let power = (self.spec.fleet_power_gw() * mean - loss) * 1e6;
-            self.f.push(self.x[AXIS_F]);
-            self.x = fly(&self.plant, self.x, power, part_s);
-            self.f.push(self.x[AXIS_F]);
-        }
-    }
-
-    fn lowest_and_highest(&self) -> (f64, f64) {
-        let all = || self.f.iter().copied();
-        (
-            all().fold(f64::INFINITY, f64::min),
-            all().fold(f64::NEG_INFINITY, f64::max),
-        )
-    }
-}
-
 /// How near the fleets came to the bounds, as shares of them: 1 is the bound.
 #[derive(Debug, Default)]
 struct Nearest {
@@ -204,27 +65,9 @@ struct Nearest {
 
 #[test]
 fn no_fleet_leaves_the_bounds_of_games_and_verifier() {
-    let mut random = Random::new(21);
     for spec in specs() {
         let bytes = bare(&spec);
-        let view = TableView::parse(&bytes).unwrap();
-        let problem = Problem::new(&spec).unwrap();
-        let model = closed_loop(&view, &spec);
-        assert_eq!(model.known.limit, None);
-        let bounds = Bounds {
-            spec: &spec,
-            view: &view,
-            games: synthesis::abstraction(&problem).unwrap(),
-            effective: Delay::of(&spec)
-                .unwrap()
-                .map_or(problem.measurement, |delay| delay.effective),
-            problem,
-            model,
-        };
-        let mut nearest = Nearest::default();
-        for trial in 0..TRIALS {
-            bounds.trial(&mut random, trial, &mut nearest);
-        }
+        let nearest = Bounds::of(&spec, &TableView::parse(&bytes).unwrap()).attacked();
         println!("{:?}: {nearest:?}", spec.uncertainty.actuation_delay_s);
         // The fleets come near the bounds, so the test can fail. A box holds a whole cell and
         // errors in both directions, which one trajectory does not meet together.
@@ -234,6 +77,55 @@ fn no_fleet_leaves_the_bounds_of_games_and_verifier() {
     }
 }
 
+/// The same fleets against bounds of which one is that of a shorter range.
+fn attack_broken(shorter: &str, breaks: impl Fn(&mut Bounds<'_>, Bounds<'_>)) {
+    let key = "uncertainty.actuation_delay_s";
+    let spec = delayed(&[&format!("{key}=[0.3,2]")]);
+    let shorter = delayed(&[&format!("{key}={shorter}")]);
+    let (bytes, others) = (bare(&spec), bare(&shorter));
+    let (view, other) = (
+        TableView::parse(&bytes).unwrap(),
+        TableView::parse(&others).unwrap(),
+    );
+    let mut bounds = Bounds::of(&spec, &view);
+    breaks(&mut bounds, Bounds::of(&shorter, &other));
+    bounds.attacked();
+}
+
+#[test]
+#[should_panic(expected = "games, axis 0")]
+fn fleets_leave_the_games_boxes_of_a_fixed_delay() {
+    attack_broken("0.3", |bounds, other| bounds.games = other.games);
+}
+
+#[test]
+#[should_panic(expected = "verifier, axis 0")]
+fn fleets_leave_the_verifiers_boxes_of_a_fixed_delay() {
+    attack_broken("0.3", |bounds, other| {
+        bounds.model.known.drifts = other.model.known.drifts;
+    });
+}
+
+#[test]
+#[should_panic(expected = "tight")]
+fn fleets_leave_the_tight_sets_of_a_shorter_range() {
+    attack_broken("[0.3,1.9]", |bounds, other| {
+        bounds.model.changeover = other.model.changeover;
+    });
+}
+
+#[test]
+#[should_panic(expected = "prediction")]
+fn fleets_leave_the_prediction_over_another_delay() {
+    attack_broken("[0.2,2]", |bounds, other| bounds.late = other.late);
+}
+
+#[test]
+#[should_panic(expected = "guard")]
+fn fleets_leave_the_guard_of_a_fixed_delay() {
+    attack_broken("0.3", |bounds, _| bounds.problem.changeover = None);
+}
+
 struct Bounds<'a> {
     spec: &'a Spec,
     view: &'a TableView<'a>,
@@ -241,13 +133,40 @@ struct Bounds<'a> {
     games: synth::abstraction::affine::AffineAbstraction<STATES>,
     effective: [f64; STATES],
     model: Model,
+    /// Ticks after which a command begins to act.
+    late: u32,
 }
 
-impl Bounds<'_> {
+impl<'a> Bounds<'a> {
+    fn of(spec: &'a Spec, view: &'a TableView<'a>) -> Self {
+        let problem = Problem::new(spec).unwrap();
+        let model = closed_loop(view, spec);
+        assert_eq!(model.known.limit, None);
+        Self {
+            spec,
+            view,
+            games: synthesis::abstraction(&problem).unwrap(),
+            effective: Delay::of(spec)
+                .unwrap()
+                .map_or(problem.measurement, |delay| delay.effective),
+            problem,
+            model,
+            late: delay::ticks(spec),
+        }
+    }
+
+    fn attacked(&self) -> Nearest {
+        let (mut random, mut nearest) = (Random::new(21), Nearest::default());
+        for trial in 0..TRIALS {
+            self.trial(&mut random, trial, &mut nearest);
+        }
+        nearest
+    }
+
     fn trial(&self, random: &mut Random, trial: u32, nearest: &mut Nearest) {
         let (spec, grid) = (self.spec, self.view.header().grid);
         let tick_s = f64::from(spec.sampling.watch_ms()) / 1000.0;
-        let (late, period) = (delay::ticks(spec), spec.sampling.ticks_per_period());
+        let (late, period) = (self.late, spec.sampling.ticks_per_period());
         let ends_s = *spec.uncertainty.actuation_delay_s.ends_s();
         let style = STYLES[trial as usize % STYLES.len()];
         let mut run = Run {
@@ -311,7 +230,10 @@ impl Bounds<'_> {
             // The stored state is a floor.
             let off = (run.x[d] - f64::from(known.0[d]) - 0.5).abs() - 0.5;
             for bound in [self.effective[d], self.model.known.real[d]] {
-                assert!(off <= bound + DUST, "axis {d}: {off} of {bound}");
+                assert!(
+                    off <= bound + DUST,
+                    "prediction, axis {d}: {off} of {bound}"
+                );
                 if bound > 1.0 {
                     nearest.prediction = nearest.prediction.max(off / bound);
                 }
@@ -339,7 +261,7 @@ impl Bounds<'_> {
         let (lowest, highest) = run.lowest_and_highest();
         assert!(
             lowest >= range.low - DUST && highest <= range.high + DUST,
-            "{levels:?} {:?}: {lowest} {highest} {range:?}",
+            "tight f, {levels:?} {:?}: {lowest} {highest} {range:?}",
             run.fleet.style
         );
         for d in 0..STATES {
@@ -347,7 +269,7 @@ impl Bounds<'_> {
             let x = run.x[d];
             assert!(
                 bounds.low - DUST <= x && x <= bounds.high + DUST,
-                "axis {d} {levels:?} {:?}: {x} {bounds:?}",
+                "tight, axis {d} {levels:?} {:?}: {x} {bounds:?}",
                 run.fleet.style
             );
         }
@@ -429,7 +351,7 @@ impl Bounds<'_> {
                 band,
             );
             let permitted = guard.permitted(at, 1 << new);
-            assert_eq!(permitted, 0, "{:?}: {band:?}", run.fleet.style);
+            assert_eq!(permitted, 0, "guard, {:?}: {band:?}", run.fleet.style);
         }
     }
 }

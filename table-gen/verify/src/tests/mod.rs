@@ -3,6 +3,7 @@
 
 mod delay;
 mod delay_range;
+mod late_fleet;
 mod tube;
 
 use rand::{Rng, SeedableRng};
