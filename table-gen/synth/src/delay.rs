@@ -45,8 +45,8 @@
 //! ```
 //!
 //! of ξ, whatever is under way. Where the delay is a range, δ is its least, and the time under u
-//! begins with a changeover ([`crate::changeover`]). Targets shrink and containment rises by E' of f, as they do by e
-//! without a delay; the guard between the samples widens the cell by E'.
+//! begins with a changeover ([`crate::changeover`]). Targets shrink and containment rises by E' of
+//! f, as they do by e without a delay; the guard between the samples widens the cell by E'.
 
 use firmware::prediction::{MEASURED_MAX, PHI_FRACTION_BITS, RESPONSE_FRACTION_BITS};
 

@@ -117,9 +117,9 @@ impl Changeover {
 
     /// Replaces, in what a level adds over a period to the state that is decided on, its own net
     /// power by any level's for the time of the changeover: the last of it, counted back from the
-    /// period's end. `any` is that of any level beside what the effect's centre counts all the same,
-    /// and `own_mid` the level's own middle beside it, which the centre holds; its radius holds
-    /// nothing for that time.
+    /// period's end. `any` is that of any level beside what the effect's centre counts all the
+    /// same, and `own_mid` the level's own middle beside it, which the centre holds; its radius
+    /// holds nothing for that time.
     pub(super) fn replace(
         &self,
         effect: &mut PeriodEffect,
