@@ -29,7 +29,7 @@ def main():
     out = Path(sys.argv[1])
     features = sys.argv[2] if len(sys.argv) > 2 else "board"
     tree = cargo(
-        *["tree", "--locked", "-p", "firmware", "--features", features, "--target", TARGET],
+        *["tree", "--locked", "-p", "product", "--features", features, "--target", TARGET],
         *["-e", "normal,no-proc-macro", "--prefix", "none", "--format", "{p}|{l}"],
     )
     lock = tomllib.loads((ROOT / "Cargo.lock").read_text())
@@ -46,7 +46,7 @@ def main():
             "licenses": licence(text),
             "purl": f"pkg:cargo/{name}@{version}",
         }
-        if name == "firmware":
+        if name == "product":
             product = {**component, "type": "firmware", "name": "holdfast"}
             continue
         checksum = sums[name, version]

@@ -66,7 +66,10 @@ fn the_verifier_depends_on_model_and_firmware_alone() {
 /// anything.
 #[test]
 fn the_runners_are_built_without_the_engine() {
-    assert_eq!(reached("fw"), names(&["c-api", "firmware", "model"]));
+    let device = [
+        "c-api", "firmware", "product", "service", "settings", "update",
+    ];
+    assert_eq!(reached("fw"), names(&[&device[..], &["model"]].concat()));
     assert_eq!(reached("test-all"), names(&[]));
 }
 
@@ -77,6 +80,8 @@ fn nothing_flows_back() {
     assert_eq!(reached("settings"), names(&["firmware"]));
     assert_eq!(reached("service"), names(&["firmware", "settings"]));
     assert_eq!(reached("update"), names(&["firmware"]));
+    let parts = ["firmware", "service", "settings", "update"];
+    assert_eq!(reached("product"), names(&parts));
     assert_eq!(reached("model"), names(&["firmware"]));
     assert_eq!(reached("synth"), names(&["firmware", "model"]));
     assert_eq!(reached("lab"), names(&["firmware", "model"]));

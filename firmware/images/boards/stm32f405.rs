@@ -9,36 +9,39 @@
 //! | PB0 | contactor, high closes | unless `bidirectional` |
 //! | PA8 | signed power set-point, 1 kHz (TIM1 channel 1) | `bidirectional` |
 //! | PA1 | the pilot's voltage: 1.65 V for 0 V, 3.15 V for 12 V (ADC1) | unless `bidirectional` |
-//! | PA2 | telemetry, 115 200 baud 8N1 (USART2) | always |
+//! | PA2 | telemetry and answers, 115 200 baud 8N1 (USART2) | always |
+//! | PA3 | what is asked, the same line's other direction (USART2, DMA1 stream 5) | always |
 //!
 //! The timer captures a crossing in hardware. The watchdog bites after four ticks without a
 //! completed one, and a panic ends in it too.
 
 #[path = "stm32f405/clock.rs"]
 mod clock;
+#[path = "stm32f405/dog.rs"]
+mod dog;
 #[path = "stm32f405/ending.rs"]
 mod ending;
+#[path = "stm32f405/flash.rs"]
+pub(crate) mod flash;
+#[path = "stm32f405/line.rs"]
+mod line;
 
 use embedded_hal::spi::{ErrorType, MODE_3, Operation, SpiDevice};
-use embedded_hal_nb::serial::Write as _;
 use firmware::board::{Board, Hardware, Rest};
-use firmware::charger::{Watchdog, reference};
+use firmware::charger::reference;
 use firmware::dispatch::car::{CarSense, CarState};
 use firmware::dispatch::pilot::PILOT_HZ;
 use firmware::fault::{Faults, ResetCause};
 use firmware::frequency::zero_crossing::Captures;
 use firmware::retained::{self, Ending};
 use stm32f4xx_hal::gpio::{Output, PA0, PA1, PA4, PA5, PA6, PA7, PA8, PB0};
-use stm32f4xx_hal::pac::{self, ADC_COMMON, ADC1, SPI1, TIM1, TIM2, TIM5, USART2};
+use stm32f4xx_hal::pac::{self, ADC_COMMON, ADC1, SPI1, TIM1, TIM2, TIM5};
 use stm32f4xx_hal::prelude::*;
 use stm32f4xx_hal::rcc::Rcc;
-use stm32f4xx_hal::serial::config::Config as SerialConfig;
-use stm32f4xx_hal::serial::{Serial, Tx};
 use stm32f4xx_hal::signature::Uid;
 use stm32f4xx_hal::spi;
 use stm32f4xx_hal::timer::capture::{CaptureChannel, CaptureHzManager};
 use stm32f4xx_hal::timer::{CaptureFilter, CapturePolarity, CounterUs, Flag, PwmChannel, Timer};
-use stm32f4xx_hal::watchdog::IndependentWatchdog;
 
 /// Core and timer clock \[MHz\].
 const CORE_MHZ: u32 = clock::CORE_MHZ;
@@ -56,17 +59,10 @@ const SUPPLY_MV: i32 = 3_300;
 const PILOT_ZERO_MV: i32 = 1_650;
 /// Volts on the pilot for one on PA1.
 const PILOT_GAIN: i32 = 8;
-/// Longest time without a completed tick \[ms\].
-const WATCHDOG_MS: u32 = 400;
-/// Telemetry \[baud\].
-const BAUD: u32 = 115_200;
 /// Clock of the SPI \[kHz\]: slow enough for pins at their lowest slew rate.
 const SPI_KHZ: u32 = 1_000;
 /// Time waited from chip select to the first edge, and from the last edge to release \[µs\].
 const SETTLE_US: u32 = 2;
-
-// Two of the longest ticks fit before it bites.
-const _: () = assert!(WATCHDOG_MS >= 2 * firmware::table::TICK_MS_MAX as u32);
 
 /// The board, started.
 pub(crate) struct Started {
@@ -75,7 +71,7 @@ pub(crate) struct Started {
     /// Time and telemetry.
     pub(crate) board: Lines,
     /// The watchdog, running.
-    pub(crate) watchdog: Dog,
+    pub(crate) watchdog: dog::Dog,
     /// Why the controller started.
     pub(crate) cause: ResetCause,
     /// What is wrong with the board in this run.
@@ -84,6 +80,8 @@ pub(crate) struct Started {
     pub(crate) starts: u8,
     /// A number of this chip, for its place in the fleet.
     pub(crate) serial: u32,
+    /// Where settings and slots are kept.
+    pub(crate) places: (flash::SettingsFlash, flash::SlotFlash),
 }
 
 /// Starts watchdog, clocks, time and telemetry. `None` if one of them does not start, or a second
@@ -91,8 +89,7 @@ pub(crate) struct Started {
 pub(crate) fn start() -> Option<Started> {
     let peripherals = pac::Peripherals::take()?;
     // Before the clock: a crystal that does not start must not hang the charger for ever.
-    let mut watchdog = IndependentWatchdog::new(peripherals.IWDG);
-    watchdog.start(WATCHDOG_MS.millis());
+    let watchdog = dog::Dog::start(peripherals.IWDG);
     let cause = reset_cause(&peripherals.RCC);
     let mut kept = ending::Backup::open(&peripherals.RCC, &peripherals.PWR);
     let last = retained::start(&mut kept);
@@ -106,8 +103,8 @@ pub(crate) fn start() -> Option<Started> {
     }
     let port_a = peripherals.GPIOA.split(&mut rcc);
     let port_b = peripherals.GPIOB.split(&mut rcc);
-    let baud = SerialConfig::default().baudrate(BAUD.bps());
-    let line = Serial::tx(peripherals.USART2, port_a.pa2, baud, &mut rcc).ok()?;
+    let pins = (port_a.pa2, port_a.pa3);
+    let line = line::Line::start(peripherals.USART2, pins, peripherals.DMA1, &mut rcc)?;
     let mut timer = peripherals.TIM2.counter_us(&mut rcc);
     timer.start(u32::MAX.micros()).ok()?;
     let spi = (
@@ -127,11 +124,12 @@ pub(crate) fn start() -> Option<Started> {
             car: Some((peripherals.ADC1, peripherals.ADC_COMMON, port_a.pa1)),
         },
         board: Lines { timer, line },
-        watchdog: Dog(watchdog),
+        watchdog,
         cause,
         faults,
         starts: last.starts,
         serial: serial_number(),
+        places: flash::places(peripherals.FLASH),
     })
 }
 
@@ -157,19 +155,10 @@ fn serial_number() -> u32 {
     lot.wrapping_mul(0x0100_0193) ^ die ^ (u32::from(uid.waf_num()) << 8)
 }
 
-/// The independent watchdog, which runs on its own oscillator.
-pub(crate) struct Dog(IndependentWatchdog);
-
-impl Watchdog for Dog {
-    fn feed(&mut self) {
-        self.0.feed();
-    }
-}
-
 /// Time (TIM2) and telemetry (USART2).
 pub(crate) struct Lines {
     timer: CounterUs<TIM2>,
-    line: Tx<USART2>,
+    line: line::Line,
 }
 
 impl Board for Lines {
@@ -178,7 +167,11 @@ impl Board for Lines {
     }
 
     fn send(&mut self, byte: u8) -> bool {
-        self.line.write(byte).is_ok()
+        self.line.send(byte)
+    }
+
+    fn receive(&mut self) -> Option<u8> {
+        self.line.receive()
     }
 }
 

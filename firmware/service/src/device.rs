@@ -9,8 +9,11 @@
 //! twice in a charger's life, whatever resets it, and the flash is written once in [`BLOCK`]
 //! challenges. One challenge is open at a time, for [`OPEN_MS`], and for one attempt.
 //!
-//! A write to flash may stop the processor: 16 µs a word, and an erasure for a second or more. An
-//! order that writes is carried out where it is taken, between two ticks.
+//! A write to flash may stop the processor: 16 µs a word, and an erasure for half a second or more.
+//! An order that writes is carried out where it is taken, between two ticks, and refused while
+//! [`Facts::may_write`] says no. Limits and overrides write nothing but a block of challenges, and
+//! [`Device::look_ahead`] sets one aside before the last is used up: so they pass in an event, at
+//! least [`AHEAD`] of them.
 
 use embedded_storage::nor_flash::MultiwriteNorFlash;
 use firmware::dispatch::LimitSource;
@@ -22,13 +25,16 @@ use settings::values::Values;
 use crate::facts::Facts;
 use crate::frame::{Collector, FRAME_MAX, RECORD_MAX, encode};
 use crate::message::{
-    Answer, Ask, Identity, Order, Pairs, Refusal, SETTINGS_MAX, Status, read_ask, read_order,
-    write_answer,
+    Answer, Ask, Identity, Order, Pairs, Refusal, SETTINGS_MAX, Status, UNASKED, read_ask,
+    read_order, write_answer,
 };
 use crate::seal::{Challenge, DeviceKey, MAC_LEN};
 
 /// Challenges for which the flash is written once.
 pub const BLOCK: u32 = 64;
+/// Challenges that are left when the next block is set aside beforehand.
+pub const AHEAD: u32 = 32;
+const _: () = assert!(AHEAD < BLOCK);
 /// How long a challenge is open \[ms\].
 pub const OPEN_MS: u32 = 30_000;
 /// Least time between two challenges \[ms\].
@@ -128,6 +134,31 @@ impl<F: MultiwriteNorFlash> Device<F> {
             .take_if(|at| now_ms.wrapping_sub(*at) >= GAP_MS);
     }
 
+    /// To be called while [`Facts::may_count`] says yes: sets the next block of challenges aside, if the
+    /// one in use is used up soon. A charger that was asked for none in this run writes nothing.
+    pub fn look_ahead(&mut self) {
+        if let Some(number) = self.next
+            && number < self.ceiling
+            && self.ceiling - number <= AHEAD
+        {
+            // A write that fails is tried again when a challenge asks for it.
+            let _ = self.set_aside();
+        }
+    }
+
+    /// Sets a block of challenges aside.
+    fn set_aside(&mut self) -> Result<(), Refusal> {
+        let ceiling = self.ceiling.checked_add(BLOCK).ok_or(Refusal::Flash)?;
+        self.store.write_ceiling(ceiling).map_err(flash)?;
+        self.ceiling = ceiling;
+        Ok(())
+    }
+
+    /// Where the settings come from.
+    pub const fn origin(&self) -> Origin {
+        self.origin
+    }
+
     /// Takes a byte of the line.
     pub fn take(&mut self, byte: u8, now_ms: u32, facts: &mut impl Facts) {
         let Some(record) = self.collector.take(byte) else {
@@ -162,6 +193,20 @@ impl<F: MultiwriteNorFlash> Device<F> {
         self.outbox.sent = 0;
     }
 
+    /// Says who the charger is without having been asked: an answer of number 0. Nothing is done
+    /// while another answer waits; whether it was taken.
+    pub fn introduce(&mut self, facts: &impl Facts) -> bool {
+        if self.outbox.sent < self.outbox.length {
+            return false;
+        }
+        let identity = Answer::Identity(self.identity(facts));
+        let mut record = [0; RECORD_MAX];
+        let record = write_answer(UNASKED, &identity, &mut record);
+        self.outbox.length = encode(record, &mut self.outbox.frame).len();
+        self.outbox.sent = 0;
+        true
+    }
+
     /// The next byte for the line, if an answer is under way. An answer is sent without a break.
     pub fn to_send(&self) -> Option<u8> {
         let waiting = self.outbox.frame.get(..self.outbox.length)?;
@@ -183,16 +228,17 @@ impl<F: MultiwriteNorFlash> Device<F> {
             Ask::Identity => Ok(Answer::Identity(self.identity(facts))),
             Ask::Status => Ok(Answer::Status(self.status(now_ms, facts))),
             Ask::Settings { from } => Ok(self.settings(from)),
-            Ask::Challenge => self.challenge(now_ms, facts.serial()),
+            Ask::Challenge => self.challenge(now_ms, facts),
             Ask::Order {
                 challenge,
                 order,
                 mac,
-            } => self.order(challenge, order, &mac, now_ms),
+            } => self.order(challenge, order, &mac, now_ms, facts.may_write()),
             Ask::Provision { key } => {
                 if self.key()?.is_some() {
                     return Err(Refusal::HasKey);
                 }
+                writes(facts.may_write())?;
                 self.store.write_device_key(&key).map_err(flash)?;
                 self.key = Ok(Some(DeviceKey::new(key)));
                 Ok(Answer::Provisioned)
@@ -251,7 +297,7 @@ impl<F: MultiwriteNorFlash> Device<F> {
         self.key.map_err(flash)
     }
 
-    fn challenge(&mut self, now_ms: u32, serial: u32) -> Result<Answer<'static>, Refusal> {
+    fn challenge(&mut self, now_ms: u32, facts: &impl Facts) -> Result<Answer<'static>, Refusal> {
         let key = self.key()?.ok_or(Refusal::NoKey)?;
         if self
             .last_challenge_ms
@@ -262,12 +308,11 @@ impl<F: MultiwriteNorFlash> Device<F> {
         self.last_challenge_ms = Some(now_ms);
         let number = self.next.ok_or(Refusal::Flash)?;
         if number == self.ceiling {
-            let ceiling = number.checked_add(BLOCK).ok_or(Refusal::Flash)?;
-            self.store.write_ceiling(ceiling).map_err(flash)?;
-            self.ceiling = ceiling;
+            writes(facts.may_count())?;
+            self.set_aside()?;
         }
         self.next = Some(number + 1);
-        let challenge = key.challenge(serial, number);
+        let challenge = key.challenge(facts.serial(), number);
         self.open = Some(Open {
             challenge,
             since_ms: now_ms,
@@ -284,6 +329,7 @@ impl<F: MultiwriteNorFlash> Device<F> {
         record: &[u8],
         mac: &[u8; MAC_LEN],
         now_ms: u32,
+        may_write: bool,
     ) -> Result<Answer<'static>, Refusal> {
         let key = self.key()?.ok_or(Refusal::NoKey)?;
         // One attempt: right or wrong, the challenge is used.
@@ -295,6 +341,12 @@ impl<F: MultiwriteNorFlash> Device<F> {
             return Err(Refusal::NotAuthentic);
         }
         let order = read_order(record).ok_or(Refusal::Malformed)?;
+        if matches!(
+            order,
+            Order::Settings(_) | Order::Defaults | Order::NewKey { .. }
+        ) {
+            writes(may_write)?;
+        }
         self.carry_out(&order, &key, &challenge, now_ms)?;
         let mac = key.done_mac(&challenge, record);
         Ok(Answer::Done { mac })
@@ -372,6 +424,15 @@ impl<F: MultiwriteNorFlash> Device<F> {
 
 /// Longest answer of an update.
 const UPDATE_MAX: usize = 160;
+
+/// Whether something that writes the flash may go on.
+const fn writes(may_write: bool) -> Result<(), Refusal> {
+    if may_write {
+        Ok(())
+    } else {
+        Err(Refusal::NotNow)
+    }
+}
 
 const fn flash(_: StoreError) -> Refusal {
     Refusal::Flash

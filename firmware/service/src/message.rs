@@ -21,6 +21,10 @@ pub const ORDER_MAX: usize = 160;
 /// Longest name of a build.
 pub const NAME_MAX: usize = 32;
 
+/// Number of an answer that nobody asked for: a charger says by itself who it is. Whoever asks
+/// chooses another.
+pub const UNASKED: u8 = 0;
+
 /// Number and value of settings.
 pub type Pairs = Vec<(u8, u32), SETTINGS_MAX>;
 
@@ -171,6 +175,8 @@ pub enum Refusal {
     Flash,
     /// This charger does not know how to do that.
     NotHere,
+    /// The order writes the flash, and the charger charges or responds to the grid: later.
+    NotNow,
 }
 
 impl From<ValueError> for Refusal {

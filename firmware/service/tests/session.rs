@@ -17,7 +17,7 @@ use bench::{Bench, KEY};
 use firmware::dispatch::LimitSource;
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
-use service::device::{BLOCK, GAP_MS, OPEN_MS};
+use service::device::{AHEAD, BLOCK, GAP_MS, OPEN_MS};
 use service::message::{Answer, Ask, Order, Pairs, Refusal, Status};
 use service::seal::DeviceKey;
 use settings::key::Key;
@@ -147,6 +147,49 @@ fn a_challenge_is_never_given_twice() {
         bench.ask(&Ask::Challenge),
         Answer::Refused(Refusal::TooSoon)
     );
+}
+
+#[test]
+fn in_an_event_nothing_is_written_and_limits_pass() {
+    let mut bench = Bench::new();
+    bench.may_write(false);
+    let key = *KEY.bytes();
+    let refused = Answer::Refused(Refusal::NotNow);
+    assert_eq!(bench.ask(&Ask::Provision { key }), refused);
+    bench.may_write(true);
+    bench.provision();
+    // The first block is set aside at rest, the next one before it is used up.
+    for _ in 0..BLOCK {
+        bench.device.look_ahead();
+        assert!(bench.order(&limit(20_000)));
+    }
+    bench.device.look_ahead();
+    bench.may_write(false);
+    for ma in 0..AHEAD {
+        assert!(bench.order(&limit(10_000 + ma)));
+        assert_eq!(site_limit(&mut bench), 10_000 + ma);
+    }
+    bench.wait(GAP_MS);
+    let user = pairs(&[(Key::UserLimit, 9_000)]);
+    for order in [Order::Settings(user), Order::Defaults] {
+        assert_eq!(bench.order_with(&KEY, &order), refused);
+        bench.wait(GAP_MS);
+    }
+    assert!(!bench.new_key(&DeviceKey::new([9; 32])));
+    // Without looking ahead a block ends where it ends.
+    let mut given = 0;
+    loop {
+        bench.wait(GAP_MS);
+        match bench.ask(&Ask::Challenge) {
+            Answer::Challenge { .. } => given += 1,
+            other => break assert_eq!(other, refused),
+        }
+    }
+    assert!(given < BLOCK, "{given}");
+    bench.may_write(true);
+    bench.wait(GAP_MS);
+    assert!(bench.order(&limit(7_000)));
+    assert_eq!(site_limit(&mut bench), 7_000);
 }
 
 #[test]

@@ -11,6 +11,7 @@
 //! | [`layout`] | where the two slots lie |
 //! | [`slots`] | which of two slots a charger starts with, and how the other is written |
 //! | [`trial`] | when a new table has run well enough to be kept |
+//! | [`wire`] | a container that comes in parts over a line, and the answers |
 //! | [`mapped`] | flash that the processor sees as memory |
 //!
 //! # What holds when the power fails
@@ -37,3 +38,4 @@ pub mod marks;
 pub mod refusal;
 pub mod slots;
 pub mod trial;
+pub mod wire;

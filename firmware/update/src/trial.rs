@@ -23,6 +23,9 @@ pub struct Trial {
 }
 
 impl Trial {
+    /// Before the first tick.
+    pub const DEFAULT: Self = Self { good_ticks: 0 };
+
     /// A tick of the charger; whether the table has now proven itself, and is to be confirmed.
     ///
     /// A tick counts if the table decided. One with a fault that a table can cause starts the count

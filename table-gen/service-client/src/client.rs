@@ -12,6 +12,7 @@ use service::message::{
 };
 use service::seal::{Challenge, DeviceKey};
 use settings::key::Key;
+use update::wire::{PART_MAX, Reason, Said, State, Step, read_said, write_step};
 
 use crate::port::Port;
 
@@ -60,6 +61,9 @@ pub enum ClientError {
         "the answer to the order is not the charger's: somebody is on the line; ask for `settings` and `status`"
     )]
     NotTheCharger,
+    /// The container is not taken.
+    #[error("the charger does not take it: {}", reason(.0))]
+    NotTaken(Reason),
     /// An answer of another kind.
     #[error("the charger's answer is to another question; its firmware may be of another version")]
     Unexpected,
@@ -71,6 +75,12 @@ fn silence(heard: u64) -> &'static str {
     } else {
         "bytes came, but no answer: is it a charger's port, and does its firmware have the service?"
     }
+}
+
+/// The reason of an update's refusal for people.
+fn reason(reason: &Reason) -> String {
+    let text = reason.text().replace("{a}", &reason.first.to_string());
+    text.replace("{b}", &reason.second.to_string())
 }
 
 /// A refusal for people.
@@ -107,6 +117,11 @@ pub fn refusal(refusal: &Refusal) -> String {
         ),
         Refusal::Flash => "its flash cannot be read or written; nothing is certain of it".into(),
         Refusal::NotHere => "its firmware cannot do that".into(),
+        Refusal::NotNow => {
+            "it charges or responds to the grid, and would have to stand still while it \
+                            writes; try again later, or pause it (`override pause`)"
+                .into()
+        }
     }
 }
 
@@ -137,7 +152,8 @@ impl Client {
 
     /// Asks once; the answer's record.
     fn once(&mut self, ask: &Ask<'_>, wait: Duration) -> Result<Option<Vec<u8>>, ClientError> {
-        self.id = self.id.wrapping_add(1);
+        // Never 0, which is nobody's question.
+        self.id = self.id.checked_add(1).unwrap_or(1);
         let mut buffer = [0; RECORD_MAX];
         let record = write_ask(self.id, ask, &mut buffer);
         let sent = self.port.send(record);
@@ -207,6 +223,57 @@ impl Client {
             if pairs.is_empty() || all.len() >= usize::from(count) {
                 return Ok(all);
             }
+        }
+    }
+
+    /// A step of an update; every step may be asked again.
+    fn step(&mut self, step: &Step<'_>, wait: Duration) -> Result<Said, ClientError> {
+        let mut buffer = [0; RECORD_MAX];
+        let ask = Ask::Update(write_step(step, &mut buffer));
+        for _ in 0..ATTEMPTS {
+            let Some(record) = self.once(&ask, wait)? else {
+                continue;
+            };
+            let said = taken(&record, |answer| match answer {
+                Answer::Update(said) => read_said(said),
+                _ => None,
+            })?;
+            return match said {
+                Said::Refused(reason) => Err(ClientError::NotTaken(reason)),
+                said => Ok(said),
+            };
+        }
+        let heard = self.port.heard();
+        Err(ClientError::NoAnswer { heard })
+    }
+
+    /// Which of the tables that came by update is in force.
+    ///
+    /// # Errors
+    /// [`ClientError`].
+    pub fn update_state(&mut self) -> Result<State, ClientError> {
+        match self.step(&Step::State, READ_WAIT)? {
+            Said::State(state) => Ok(state),
+            _ => Err(ClientError::Unexpected),
+        }
+    }
+
+    /// Sends a signed container and has it installed; its version, which is in force from the next
+    /// start on.
+    ///
+    /// # Errors
+    /// [`ClientError`].
+    pub fn install(&mut self, container: &[u8], now_s: Option<u32>) -> Result<u32, ClientError> {
+        let len = u32::try_from(container.len()).unwrap_or(u32::MAX);
+        self.step(&Step::Begin { len }, READ_WAIT)?;
+        let mut at = 0;
+        for bytes in container.chunks(PART_MAX) {
+            self.step(&Step::Part { at, bytes }, READ_WAIT)?;
+            at += bytes.len() as u32;
+        }
+        match self.step(&Step::Install { now_s }, WRITE_WAIT)? {
+            Said::Installed { version } => Ok(version),
+            _ => Err(ClientError::Unexpected),
         }
     }
 

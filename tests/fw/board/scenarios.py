@@ -5,6 +5,8 @@ import zlib
 
 from checks import LIMIT_MA, OFF_S, Run, delay_ms, full, offered, power_w, serial_of, states, threshold_of, uid_of
 from mains import Chip, Grid, Mains
+from service import RESTART, Tool, limit, override, settings
+from telemetry import Reader, fields
 
 # The delay of a start is drawn from the serial number and the first reading: one that draws little, for these.
 SOON_MS = 60_400
@@ -300,18 +302,272 @@ def chip(images):
     return run.sound()
 
 
-def clock_wrap(images):
-    """The microsecond counter goes round after 71.6 minutes; no tick is lost. Only if asked for: it takes minutes."""
-    run = Run(images.uni, car="A").to(4330.0)
-    around = run.between(4280.0, 4330.0)
-    run.check("no fault around it", around and all(not f.faults for f in around), around[:1])
+def tool_for(run):
+    return Tool(run, serial_of(run.board.uid))
+
+
+def provisioned(image, **wired):
+    """A charger that has its key, from 2 s on, and the tool that has it too."""
+    run = Run(image, **wired).to(2.0)
+    tool = tool_for(run)
+    answer = tool.provision()
+    run.check("it takes its first key", answer and answer[0] == 5, answer)
+    return run, tool
+
+
+def limits(images):
+    """Limits over the line reach the car within two ticks, and are over when their time is; no order without the key."""
+    uid = soon(images.uni)
+    run = Run(images.uni, uid=uid).to(2.0)
+    tool = tool_for(run)
+    run.check("without a key no order is taken", tool.order(limit(1, 10_000)) == "no-key", "")
+    run.check("a key is taken once", tool.provision()[0] == 5 and tool.refusal(tool.provision()) == "has-key", "")
+    run.to(62.0)
+    run.check("it charges", full(run.offers(61.8, 62.0)) and run.coil(61.8, 62.0), run.board.coil)
+    other = bytes(32)
+    run.check("another's order changes nothing", tool.order(limit(1, 6_000), key=other) == "not-authentic", "")
+    forged = tool.order(limit(1, 6_000), forge=lambda seal: seal[:-1] + bytes([seal[-1] ^ 1]))
+    run.check("neither does a forged one", forged == "not-authentic", forged)
+    run.check("the full current is offered", full(run.offers(62.0, run.board.us * 1e-6)), run.offers(62.0, 70.0))
+    run.check("an order is carried out", tool.order(limit(1, 10_000, 5)) == "done", "")
+    at = run.board.us * 1e-6
+    run.to(at + 2.0)
+    offers = run.offers(at + 0.2, at + 2.0)
+    run.check("10 A are offered", len(offers) == 1 and 9_998 <= offers[0] <= 10_000, offers)
+    run.check("the contactor stays", run.coil(at, at + 2.0), run.board.coil)
+    run.to(at + 7.0)
+    run.check("after 5 s the full current is", full(run.offers(at + 5.3, at + 7.0)), run.offers(at, at + 7.0))
+    run.check("a pause is ordered", tool.order(override(2)) == "done", "")
+    at = run.board.us * 1e-6
+    run.to(at + 12.0)
+    run.rests("after the pause", at + 11.0, at + 12.0)
     return run.sound()
+
+
+def in_an_event(images):
+    """While the charger responds nothing is written, and limits pass."""
+    grid = Grid(0.7, 2.0, 63.0)
+    run, tool = provisioned(images.uni, mains=Mains(grid.hz), uid=soon(images.uni))
+    # A challenge at rest, so that a block of them is set aside.
+    run.check("an order at rest", tool.order(limit(0, 80_000)) == "done", "")
+    close_loop(run, grid, 66.0)
+    run.check("it responds", run.frames[-1].participation_ppm > 0, run.frames[-1])
+    steps = len(run.board.steps)
+    run.check("settings wait", tool.order(settings((7, 16_000))) == "not-now", "")
+    run.check("a limit passes", tool.order(limit(1, 6_500)) == "done", "")
+    run.check("nothing is written", len(run.board.steps) == steps, run.board.steps[steps:])
+    at = run.board.us * 1e-6
+    close_loop(run, grid, at + 1.0)
+    offers = run.offers(at + 0.2, at + 1.0)
+    run.check("no offer is above the limit", all(offer <= 6_500 for offer in offers), offers)
+    return run.sound()
+
+
+def settings_stay(images):
+    """Settings are kept over a reset and in force after it; what the charger bears is compared with its table."""
+    run, tool = provisioned(images.uni)
+    run.check("16 A on one phase", tool.order(settings((1, 16_000), (2, 1), (18, 0))) == "done", "")
+    run.check("out of range", tool.order(settings((1, 80_001))) == "out-of-range", "")
+    run.check("not yet a misfit", not run.frames[-1].misfits, run.frames[-1])
+    at = run.board.us * 1e-6
+    run.check("a start is ordered", tool.order(RESTART) == "done", "")
+    again = run.board.us * 1e-6
+    run.to(again + 70.0)
+    run.check("it starts", len(run.board.resets) == 2 and run.board.resets[1][0] < again + 0.5, run.board.resets)
+    who = run.identity()
+    run.check("the settings are from flash", who.settings == 1 and who.provisioned, who)
+    last = run.frames[-1]
+    run.check("another power is a misfit", last.misfits == {"power"} and last.mode == "droop-misfit", last)
+    offers = run.offers(again + 65.0, again + 70.0)
+    run.check("without the random delay 16 A are offered", offers and 15_998 <= offers[-1] <= 16_000, offers)
+    run.check("the watchdog has its usual time", run.board.dog_period_us < 0.41e6, run.board.dog_period_us)
+    return run.sound(resets=2)
+
+
+def settings_full(images):
+    """Sectors are erased as settings are written: the watchdog bears it, the charger too, and nothing is lost."""
+    run, tool = provisioned(images.uni, car="A")
+    # Settings that are not at their defaults make long records: a page holds some ten such.
+    wide = settings(*((n, 10_000) for n in (5, 7, 8, 9, 10, 11, 13)), (12, 30), (14, 2))
+    run.check("nine settings", tool.order(wide) == "done", "")
+    written = 0
+    while not any(what == "erase" for _, what, _ in run.board.steps) and written < 40:
+        run.check("written", tool.order(settings((1, 10_000 + written)), wait_s=2.0) == "done", written)
+        written += 1
+    erased = [at_s for at_s, what, _ in run.board.steps if what == "erase"]
+    run.check("a sector was erased", len(erased) == 1, (written, erased))
+    run.check("with more time for the watchdog", 0.49e6 < run.board.long_gap_us < 0.6e6, run.board.long_gap_us)
+    run.check("and the usual time after", run.board.dog_period_us < 0.41e6, run.board.dog_period_us)
+    # What stops the loop for more than 10 ms beside the erasure would be instructions, in millions.
+    late = [frame.now_ms for frame in run.frames if frame.now_ms % 100 > 2]
+    run.check("it stands still for the erasure alone", len(late) <= 1, late)
+    faults = {fault for frame in run.frames[2:] for fault in frame.faults}
+    run.check("late ticks are told", faults <= {"overrun", "no-signal", "stale", "clock-jump"}, faults)
+    run.check("then all is well", run.to(run.board.us * 1e-6 + 3.0).frames[-1].faults == frozenset(), run.frames[-1])
+    return run.sound(late_ok=[(at_s, at_s + 1.0) for at_s in erased])
+
+
+def update(images):
+    """A signed table over the line: verified, tried after the next start, kept after a minute; the next one in the other slot."""
+    run, tool = provisioned(images.uni, car="A")
+    first, second, foreign = (images.container(name) for name in ("first", "second", "foreign"))
+    shipped, other = images.table("gb-uni"), images.table("gb-uni-ade7953")
+    crc = lambda table: struct.unpack("<I", table[-4:])[0]
+    run.check("the shipped table runs", run.identity().table[1] == crc(shipped), run.identity())
+    steps = len(run.board.steps)
+    forged = first[:-1] + bytes([first[-1] ^ 1])
+    run.check("a forged one", tool.install(forged) == ("refused", 6), "")
+    run.check("one whose table was changed", tool.install(first[:40] + b"\1" + first[41:]) == ("refused", 6), "")
+    run.check("one for another charger", tool.install(foreign) == ("refused", 7), "")
+    run.check("one that is cut", tool.install(first[:-1]) == ("refused", 1), "")
+    run.check("none of them reaches the flash", len(run.board.steps) == steps, run.board.steps[steps:][:3])
+    run.check("a signed one is taken", tool.install(first) == ("installed", 1), "")
+    run.check("the old one runs on", tool.update(0) == ("state", None, 0, False, 1), tool.update(0))
+    run.check("a start", tool.order(RESTART) == "done", "")
+    run.to(run.board.us * 1e-6 + 2.0)
+    run.check("the new one is on trial", tool.update(0) == ("state", 1, 0, False, None), tool.update(0))
+    run.check("and in force", run.identity().table[1] == crc(other), run.identity())
+    run.check("without a fault", not run.frames[-1].faults and run.frames[-1].mode == "table", run.frames[-1])
+    run.check("no other while it is tried", tool.install(second) == ("refused", 17), "")
+    run.to(run.board.us * 1e-6 + 62.0)
+    run.check("it is kept", tool.update(0) == ("state", 1, 0, True, None), tool.update(0))
+    run.check("what it has is a replay", tool.install(first) == ("refused", 9), "")
+    run.check("the second goes into the other slot", tool.install(second) == ("installed", 2), "")
+    run.check("a start", tool.order(RESTART) == "done", "")
+    run.to(run.board.us * 1e-6 + 2.0)
+    run.check("it is on trial", tool.update(0) == ("state", 2, 1, False, None), tool.update(0))
+    # Three more starts, none of which it survives for a minute, and it is left.
+    for _ in range(3):
+        run.board.hang()
+        run.to(run.board.us * 1e-6 + 3.0)
+    run.check("the last trial", tool.update(0) == ("state", 2, 1, False, None), tool.update(0))
+    run.board.hang()
+    run.to(run.board.us * 1e-6 + 3.0)
+    run.check("it is rolled back", tool.update(0) == ("state", 1, 0, True, None), tool.update(0))
+    run.check("and not taken again", tool.install(second) == ("refused", 10), "")
+    run.check("the watchdog has its usual time", run.board.dog_period_us < 0.41e6, run.board.dog_period_us)
+    erased = [at_s for at_s, what, _ in run.board.steps if what == "erase"]
+    return run.sound(resets=7, late_ok=[(at_s, at_s + 1.5) for at_s in erased])
+
+
+def busy(images):
+    """A car that charges, or a response, and a table waits; a table is taken while the pilot is paused."""
+    run, tool = provisioned(images.uni, uid=soon(images.uni))
+    first = images.container("first")
+    run.to(62.0)
+    run.check("it charges", run.coil(61.9, 62.0), run.board.coil)
+    steps = len(run.board.steps)
+    run.check("not while a car charges", tool.install(first) == ("refused", 21), "")
+    run.check("nothing is written", len(run.board.steps) == steps, "")
+    run.check("a pause", tool.order(override(2)) == "done", "")
+    run.to(run.board.us * 1e-6 + 0.3)
+    before = run.board.us * 1e-6
+    run.check("then it is taken", tool.install(first) == ("installed", 1), "")
+    run.check("the pilot stays at rest meanwhile", run.offers(before, run.board.us * 1e-6) == [0], "")
+    erased = [at_s for at_s, what, _ in run.board.steps if what == "erase"]
+    return run.sound(late_ok=[(at_s, at_s + 1.5) for at_s in erased])
+
+
+def power_cuts(images):
+    """The supply fails in a step of an update: afterwards the old table is in force or the new one, and both are whole."""
+    first, second = images.container("first"), images.container("second")
+    run, tool = provisioned(images.uni, car="A")
+    run.check("the first", tool.install(first) == ("installed", 1), "")
+    run.check("a start", tool.order(RESTART) == "done", "")
+    run.to(run.board.us * 1e-6 + 64.0)
+    run.check("is kept", tool.update(0) == ("state", 1, 0, True, None), tool.update(0))
+    crcs = {1: struct.unpack("<I", images.table("gb-uni-ade7953")[-4:])[0]}
+    crcs[2] = struct.unpack("<I", images.table("gb-uni")[-4:])[0]
+    before, base, starts = bytes(run.board.flash), len(run.board.steps), len(run.board.resets)
+
+    def again():
+        """The charger as it was with the first table confirmed."""
+        nonlocal starts
+        run.board.flash[:] = before
+        run.board.power_up(run.board.resets[0][1])
+        run.to(run.board.us * 1e-6 + 1.5)
+        starts += 1
+
+    again()
+    run.check("the second", tool.install(second) == ("installed", 2), "")
+    whole = len(run.board.steps) - base
+    # Void, erase, container and complete; behind them the start that notes a trial: 8 and 8 words.
+    cuts = [0, 7, 8, 9, 30, whole - 9, whole - 8, whole - 4, whole - 1, whole, whole + 7, whole + 8, whole + 12]
+    found = []
+    for after in cuts:
+        again()
+        run.board.cut_after = after
+        tool.install(second)
+        if run.board.cut_after is not None:
+            # Its challenge writes too; where the supply fails there, it starts by itself.
+            starts += tool.order(RESTART) == "done"
+            run.to(run.board.us * 1e-6 + 2.0)
+        starts += 1
+        run.check(f"the supply fails at step {after}", run.board.cut_after is None, run.board.cut_after)
+        run.to(run.board.us * 1e-6 + 2.0)
+        state = tool.update(0)
+        running = state[1] if state else None
+        found.append(running)
+        who, last = run.identity(), run.frames[-1]
+        run.check(f"step {after}: a whole table", who.table and who.table[1] == crcs.get(running), (state, who))
+        run.check(f"step {after}: it decides", last.mode == "table" and not last.faults - {"restarted"}, last)
+        more = tool.install(second)
+        run.check(f"step {after}: again", more in (("installed", 2), ("refused", 9), ("refused", 17)), more)
+    # What is cut while it writes a frame, or a start, misses that frame.
+    run.check("the old one and the new one were found", set(found) == {1, 2}, found)
+    erased = [at_s for at_s, what, _ in run.board.steps if what == "erase"]
+    return run.sound(resets=starts, late_ok=[(at_s, at_s + 1.5) for at_s in erased])
+
+
+def clock_wrap(images):
+    """The loop's counter goes round, and so do the milliseconds, after 49.7 days: no tick is lost, a limit ends in time."""
+    run, tool = provisioned(images.uni, car="A")
+    board, turn_us, ms_round = run.board, 1 << 32, 1 << 32
+    # The counter is moved to 5 s before its end: a jump is told, the wrap is not one.
+    run.to(6.05)
+    board.move_clock(turn_us - 5_000_000 - int(board.count(board.CLOCK, board.us)))
+    run.to(16.0)
+    jumped = [frame.now_ms for frame in run.between(6.0, 16.0) if frame.faults]
+    run.check("the jump is told, the wrap is none", len(jumped) == 1, jumped)
+    # On to 20 s before the milliseconds go round, by jumps of less than a round of the counter.
+    while True:
+        left_ms = ms_round - run.frames[-1].now_ms - 20_000
+        if left_ms < 200:
+            break
+        board.move_clock(min(left_ms * 1_000, turn_us - 1_000_000))
+        run.to(board.us * 1e-6 + 0.11)
+    start = board.us * 1e-6 + 0.5
+    run.check("it is about to go round", 4_294_940_000 < run.frames[-1].now_ms < ms_round, run.frames[-1].now_ms)
+    run.check("a limit for 25 s", tool.order(limit(1, 0, 25)) == "done", "")
+    at = board.us * 1e-6
+    limits = lambda: site_limit(tool)
+    run.check("is in force", limits() == 0, limits())
+    run.to(at + 24.0)
+    run.check("after the wrap too", limits() == 0 and run.frames[-1].now_ms < 100_000, run.frames[-1].now_ms)
+    run.to(at + 26.0)
+    run.check("and ends in time", limits() == 80_000, limits())
+    around = run.between(start, 1e9)
+    run.check("no fault around it", around and all(not f.faults for f in around), [f for f in around if f.faults][:1])
+    return run.sound(late_ok=[(6.0, 6.3), (15.9, start)])
+
+
+def site_limit(tool):
+    """The site's limit in force, by the charger's status."""
+    answer = tool.ask(1)
+    record = answer[1]
+    reader = Reader(record)
+    if reader.byte():
+        fields(0.0, reader)
+    _user, site, _cable = (reader.varint() for _ in range(3))
+    return site
 
 
 SCENARIOS = {
     "start": start, "no-car": no_car, "no-mains": no_mains, "mains-gone": mains_gone, "dead-crystal": dead_crystal,
     "crystal-fails": crystal_fails, "stopped": stopped, "event": event_uni, "event-bidirectional": event_bi,
     "watchdog-in-event": watchdog_in_event, "phase-step": phase_step, "phase-step-ade7953": phase_step_chip,
-    "exact-50": exact, "jitter": jitter, "misfit": misfit, "ade7953": chip, "clock-wrap": clock_wrap,
+    "exact-50": exact, "jitter": jitter, "misfit": misfit, "ade7953": chip, "limits": limits,
+    "in-an-event": in_an_event, "settings-stay": settings_stay, "settings-full": settings_full, "update": update,
+    "busy": busy, "power-cuts": power_cuts, "clock-wrap": clock_wrap,
 }
-ON_REQUEST = {"clock-wrap"}
+ON_REQUEST = set()

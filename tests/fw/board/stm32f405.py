@@ -1,8 +1,9 @@
 """An STM32F405 for the unmodified images of the product, on the emulator `unicorn`.
 
 The processor is emulated; what is around it is modelled here at the level of registers: reset and clock control,
-ports, timers 1, 2 and 5, the serial line, the independent watchdog, the converter, the SPI, the backup registers.
-A peripheral whose clock is off reads as zero and takes nothing. Pins act only in the mode that they are set to.
+ports, timers 1, 2 and 5, the serial line with DMA, the independent watchdog, the converter, the SPI, the backup
+registers, the flash controller. A peripheral whose clock is off reads as zero and takes nothing. Pins act only in the
+mode that they are set to. While a sector of flash is erased the processor stands still, and the rest goes on.
 
 Time moves where the program waits: at a reading of TIM2 (the loop's clock), at a conversion, and while it polls a
 flag. Between two events of the outside world the loop has nothing to do, so a reading of TIM2 moves the time to the
@@ -10,10 +11,11 @@ next event, at most `TURN_US` on. Instructions between take no time.
 """
 
 import os
+import random
 import struct
 
 from elftools.elf.elffile import ELFFile
-from unicorn import UC_ARCH_ARM, UC_MODE_MCLASS, UC_MODE_THUMB, Uc, UcError
+from unicorn import UC_ARCH_ARM, UC_HOOK_MEM_WRITE, UC_MODE_MCLASS, UC_MODE_THUMB, Uc, UcError
 from unicorn.arm_const import UC_ARM_REG_LR, UC_ARM_REG_PC, UC_ARM_REG_SP, UC_ARM_REG_XPSR, UC_CPU_ARM_CORTEX_M4
 
 FLASH, FLASH_LEN = 0x0800_0000, 0x10_0000
@@ -22,6 +24,9 @@ RAM, RAM_LEN = 0x2000_0000, 0x2_0000
 BUS, BITS = 0x4000_0000, 0x4200_0000
 TIM2, TIM5, RTC_BKP0, IWDG, USART2, PWR = 0x40000000, 0x40000C00, 0x40002850, 0x40003000, 0x40004400, 0x40007000
 TIM1, ADC1, SPI1, GPIOA, GPIOB, RCC = 0x40010000, 0x40012000, 0x40013000, 0x40020000, 0x40020400, 0x40023800
+DMA1, FLASHC = 0x40026000, 0x40023C00
+# Stream 5: control, items left, addresses of the peripheral and of the memory.
+S5CR, S5NDTR, S5PAR, S5M0AR = DMA1 + 0x88, DMA1 + 0x8C, DMA1 + 0x90, DMA1 + 0x94
 UID = 0x1FFF7A10
 CRYSTAL_HZ, INTERNAL_HZ, LSI_HZ = 25e6, 16e6, 32e3
 # Registers with a meaning after a reset.
@@ -30,11 +35,19 @@ AT_RESET = {RCC: 0x83, RCC + 4: 0x24003010, GPIOA: 0xA8000000, GPIOB: 0x280, TIM
 CLOCKED = {
     GPIOA: (RCC + 0x30, 0), GPIOB: (RCC + 0x30, 1), TIM2: (RCC + 0x40, 0), TIM5: (RCC + 0x40, 3),
     USART2: (RCC + 0x40, 17), PWR: (RCC + 0x40, 28), TIM1: (RCC + 0x44, 0), ADC1: (RCC + 0x44, 8),
-    SPI1: (RCC + 0x44, 12),
+    SPI1: (RCC + 0x44, 12), DMA1: (RCC + 0x30, 21),
 }
+# The sectors of the flash: start, length, the longest time to erase one at 3.3 V by 32 bits in s (data sheet).
+SECTORS = [(n << 14, 1 << 14, 0.5) for n in range(4)] + [(1 << 16, 1 << 16, 1.1)]
+SECTORS += [(n << 17, 1 << 17, 2.0) for n in range(1, 8)]
+WORD_US = 16.0
+FLASH_KEYS = [0x45670123, 0xCDEF89AB]
+BYTE_US = 1e7 / 115200
 # Causes of a reset, as RCC's CSR shows them.
 POWER_ON, WATCHDOG = 0x0E000000, 0x24000000
 TURN_US = 1000.0
+# What memory holds that was never written.
+PAINT = b"\xcc"
 INSTRUCTIONS = 4_000_000
 POLLS = 600_000
 NMI, HARD_FAULT = 2, 3
@@ -53,14 +66,17 @@ class Board:
         self.repeatable = table is None and crystal and "ade7953" not in self.image
         self.crystal, self.internal_error = crystal, internal_error
         self.flash = bytearray(b"\xff" * FLASH_LEN)
-        for segment in ELFFile(open(elf, "rb")).iter_segments():
+        file = ELFFile(open(elf, "rb"))
+        # The variables' end: what lies above it is stack.
+        self.variables_end = file.get_section_by_name(".symtab").get_symbol_by_name("__euninit")[0]["st_value"]
+        for segment in file.iter_segments():
             if segment["p_type"] == "PT_LOAD" and segment["p_filesz"]:
                 at = segment["p_paddr"] - FLASH
                 self.flash[at:at + segment["p_filesz"]] = segment.data()
         if table is not None:
             self.flash[TABLE - FLASH:] = table.ljust(TABLE_LEN, b"\xff")
         self.uid = uid
-        self.ram = bytes(RAM_LEN)
+        self.ram = PAINT * RAM_LEN
         self.backup = 0
         self.us = 0.0
         # What was seen from outside, with its time in seconds.
@@ -68,7 +84,11 @@ class Board:
         self.stamps = []
         # What the program asked of the outside and was told, for the host to repeat: (kind, value).
         self.tape = None
-        self.gap_us = 0.0
+        self.gap_us = self.long_gap_us = 0.0
+        # What comes on PA3: (moment in us, byte).
+        self.coming = []
+        # Steps of the flash: what was done when; after how many more the supply fails, and the dice for what is left.
+        self.steps, self.cut_after, self.dice = [], None, random.Random(16)
         self.events = []
         self.order = []
         self.power_up(POWER_ON)
@@ -88,6 +108,10 @@ class Board:
         self.byte = bytearray()
         self.converted = self.polls = 0
         self.cut, self.halting = None, False
+        self.dog_open, self.dog_period_us = False, 0.0
+        self.locked, self.keys, self.busy_us, self.flash_flags, self.fixes = True, [], 0.0, 0, []
+        self.ring, self.left, self.taken = 0, 0, 0
+        self.supply = True
         self.received = []
         self.selected = False
         self.tape = []
@@ -106,6 +130,7 @@ class Board:
         uc.mem_write(HANG, b"\xfe\xe7")
         uc.mmio_map(BUS, 0x80000, self.read, None, self.write, None)
         uc.mmio_map(BITS, 0x1000000, self.read_bit, None, self.write_bit, None)
+        uc.hook_add(UC_HOOK_MEM_WRITE, self.program, None, FLASH, FLASH + FLASH_LEN - 1)
         sp, self.pc = struct.unpack("<II", uc.mem_read(FLASH, 8))
         uc.reg_write(UC_ARM_REG_SP, sp)
         self.see_outputs()
@@ -127,10 +152,16 @@ class Board:
             if self.pending is not None:
                 self.enter(self.pending)
                 self.pending = None
-            if self.us == before and self.us < self.until_us:
+            if self.us == before and self.us < self.until_us and self.supply:
                 # It waits for nothing that is modelled: it loops or sleeps.
                 self.us += 10_000.0
-            if self.bitten():
+            if not self.supply:
+                # It comes back: memory and backup registers are lost.
+                self.us += 200_000.0
+                self.ram, self.backup = PAINT * RAM_LEN, 0
+                self.coming.clear()
+                self.power_up(POWER_ON)
+            elif self.bitten():
                 self.ram = bytes(self.uc.mem_read(RAM, RAM_LEN))
                 self.power_up(WATCHDOG)
 
@@ -151,8 +182,14 @@ class Board:
         self.uc.reg_write(UC_ARM_REG_LR, 0xFFFFFFF9)
         self.pc = struct.unpack("<I", self.flash[4 * number:4 * number + 4])[0] & ~1
 
+    def stack(self):
+        """Bytes of stack that were ever written since the supply came."""
+        start = self.variables_end - RAM
+        used = bytes(self.uc.mem_read(RAM + start, RAM_LEN - start))
+        return len(used.lstrip(PAINT))
+
     def bitten(self):
-        return self.fed_us is not None and self.us - self.fed_us > self.dog_us()
+        return self.fed_us is not None and self.us - self.fed_us > self.dog_period_us
 
     def dog_us(self):
         prescaler, reload = self.regs.get(IWDG + 4, 0), self.regs.get(IWDG + 8, 0xFFF)
@@ -167,9 +204,11 @@ class Board:
         while self.mains.next_s <= t:
             self.cross(self.mains.next_s)
             self.mains.cross()
+        while self.coming and self.coming[0][0] <= self.us:
+            self.arrive(self.coming.pop(0)[1])
         while self.events and self.events[0][0] <= t:
             self.events.pop(0)[1](self)
-        self.halting = self.us >= self.until_us or self.bitten() or self.pending is not None
+        self.halting = self.us >= self.until_us or self.bitten() or self.pending is not None or not self.supply
         if self.halting:
             self.uc.emu_stop()
 
@@ -179,6 +218,8 @@ class Board:
         until = min(self.mains.next_s * 1e6, now + TURN_US)
         if self.events:
             until = min(until, self.events[0][0] * 1e6)
+        if self.coming:
+            until = min(until, self.coming[0][0])
         if self.sent_us > now:
             until = min(until, self.sent_us)
         self.advance(max(until - now, 2.0))
@@ -211,6 +252,13 @@ class Board:
         running = self.regs.get(timer, 0) & 1
         return count + (us - since) * 1e-6 * hz * running
 
+    CLOCK = TIM2
+
+    def move_clock(self, us):
+        """The loop's counter jumps ahead, as if the time had passed unseen."""
+        since, count, hz = self.counters[TIM2]
+        self.counters[TIM2] = since, count + us, hz
+
     def cross(self, at_s):
         """A zero crossing on PA0."""
         if self.regs.get(TIM5 + 0x20, 0) & 1 and self.on(TIM5) and self.mode(GPIOA, 0) == 2:
@@ -227,6 +275,95 @@ class Board:
             self.pending = NMI
         self.retime()
         self.see_outputs()
+
+    # -- the flash
+
+    def step(self, what, at, length, good):
+        """A step of the flash; `good` is what it leaves, unless the supply fails in it."""
+        self.steps.append((self.us * 1e-6, what, at))
+        if self.cut_after is not None:
+            self.cut_after -= 1
+            if self.cut_after < 0:
+                self.cut_after, self.supply = None, False
+                good = self.torn(what, at, length, good)
+        self.flash[at:at + length] = good
+        self.fixes.append((at, bytes(good)))
+        if not self.supply:
+            self.halting = True
+            self.uc.emu_stop()
+
+    def torn(self, what, at, length, good):
+        """What a step leaves in which the supply fails: as it was, as it should be, or anything between."""
+        old, way = self.flash[at:at + length], self.dice.randrange(3)
+        if way < 2:
+            return good if way else old
+        if what == "erase":
+            return self.dice.randbytes(length)
+        return bytes(new | was & self.dice.randrange(256) for was, new in zip(old, good))
+
+    def program(self, _uc, _access, address, size, value, _data):
+        """The processor writes to the flash: a word where the controller is open for words, else a fault flag."""
+        at = address - FLASH
+        old = bytes(self.flash[at:at + size])
+        control = self.regs.get(FLASHC + 0x10, 0)
+        if self.locked or not control & 1 or size != 4 or control >> 8 & 3 != 2 or at % 4:
+            self.flash_flags |= 1 << 7
+            self.fixes.append((at, old))
+            return
+        word = struct.unpack("<I", old)[0] & value & 0xFFFFFFFF
+        self.busy_us = self.us + WORD_US
+        self.step("write", at, 4, struct.pack("<I", word))
+
+    def order_flash(self, value):
+        """A word for the controller's CR."""
+        if self.locked:
+            return
+        self.regs[FLASHC + 0x10] = value & ~(1 << 16)
+        self.locked = bool(value >> 31)
+        if value >> 16 & 1 and value & 2:
+            start, length, seconds = SECTORS[value >> 3 & 15]
+            self.busy_us = self.us + seconds * 1e6
+            self.step("erase", start, length, b"\xff" * length)
+
+    def flash_status(self):
+        """SR; whoever waits stands still until the controller is done."""
+        for at, good in self.fixes:
+            self.uc.mem_write(FLASH + at, good)
+        self.fixes.clear()
+        if self.us < self.busy_us and self.supply:
+            self.advance(self.busy_us - self.us)
+        return self.flash_flags
+
+    # -- what comes on the line
+
+    def hear(self, data, at_s=None):
+        """Bytes for PA3, one after the other from this moment on."""
+        at = max(self.us if at_s is None else at_s * 1e6, self.coming[-1][0] if self.coming else 0.0)
+        self.coming += [(at + BYTE_US * (n + 1), byte) for n, byte in enumerate(data)]
+
+    def arrive(self, byte):
+        """A byte is whole: DMA puts it into the ring, if pin, receiver and stream are set up."""
+        _, ((bus, _), _) = self.tree()
+        right = abs(bus / max(self.regs.get(USART2 + 8, 0), 1) / 115200 - 1) < 0.02
+        receives = self.regs.get(USART2 + 0xC, 0) & 0x2004 == 0x2004 and self.regs.get(USART2 + 0x14, 0) >> 6 & 1
+        pin = self.mode(GPIOA, 3) == 2 and self.regs.get(GPIOA + 0x20, 0) >> 12 & 15 == 7
+        control = self.regs.get(S5CR, 0)
+        serves = control & 1 and control >> 25 & 7 == 4 and self.regs.get(S5PAR, 0) == USART2 + 4
+        if not (receives and pin and serves and self.on(DMA1) and self.on(USART2)):
+            return
+        place = self.regs.get(S5M0AR, 0) + self.ring - self.left
+        self.uc.mem_write(place, bytes([byte if right else byte ^ 0x55]))
+        self.left = self.left - 1 or (self.ring if control >> 8 & 1 else 0)
+
+    def heard(self):
+        """NDTR; with the byte that the program reads next, for the tape."""
+        word = self.left
+        if self.ring and self.taken != (self.ring - self.left) % self.ring:
+            byte = self.uc.mem_read(self.regs.get(S5M0AR, 0) + self.taken, 1)[0]
+            self.taken = (self.taken + 1) % self.ring
+            word |= byte << 16
+        self.told(b"D", word)
+        return self.left
 
     # -- pins
 
@@ -317,6 +454,12 @@ class Board:
             return 2
         if word == ADC1 + 0x4C:
             return self.told(b"A", self.converted) if self.on(ADC1) else 0
+        if word == S5NDTR:
+            return self.heard() if self.on(DMA1) else 0
+        if word == FLASHC + 0xC:
+            return self.flash_status()
+        if word == FLASHC + 0x10:
+            return self.regs.get(word, 0) & ~(1 << 31) | self.locked << 31
         if word == RCC:
             # A turn of a loop that polls a flag: eight cycles. One that polls for ever is let go on faster.
             self.polls += 1
@@ -354,12 +497,35 @@ class Board:
                 self.cause = 0
         elif word == IWDG:
             key = value & 0xFFFF
+            self.dog_open = key == 0x5555
             if key == 0xCCCC or key == 0xAAAA and self.fed_us is not None:
                 if self.fed_us is not None:
-                    self.gap_us = max(self.gap_us, self.us - self.fed_us)
+                    gap = self.us - self.fed_us
+                    # Apart: what passes while it has more time than usual.
+                    if self.dog_period_us < 1e6:
+                        self.gap_us = max(self.gap_us, gap)
+                    else:
+                        self.long_gap_us = max(self.long_gap_us, gap)
                 else:
                     self.order.append("watchdog")
-                self.fed_us = self.us
+                self.fed_us, self.dog_period_us = self.us, self.dog_us()
+            return
+        elif word in (IWDG + 4, IWDG + 8) and not self.dog_open:
+            return
+        elif word == FLASHC + 4:
+            self.keys.append(value)
+            if self.keys[-2:] == FLASH_KEYS:
+                self.locked = False
+            return
+        elif word == FLASHC + 0xC:
+            self.flash_flags &= ~value
+            return
+        elif word == FLASHC + 0x10:
+            self.order_flash(value)
+            return
+        elif word == S5NDTR:
+            self.ring = self.left = value & 0xFFFF
+            self.taken = 0
             return
         elif word == RTC_BKP0:
             if self.on(PWR) and self.regs.get(PWR, 0) >> 8 & 1:

@@ -71,13 +71,26 @@ def named(bits, names):
     return frozenset(name for n, name in enumerate(names) if bits >> n & 1)
 
 
-def decode(at_s, line):
-    """The frame of a line up to and with its zero byte."""
+def record_of(line):
+    """The record of a line up to and with its zero byte."""
     body = uncobs(line[:-1])
     record, crc = body[:-4], body[-4:]
     if len(crc) != 4 or struct.unpack("<I", crc)[0] != zlib.crc32(record):
         raise Bad("CRC")
+    return record
+
+
+def decode(at_s, record):
+    """The frame of a record."""
     r = Reader(record)
+    frame = fields(at_s, r)
+    if r.at != len(record):
+        raise Bad("length")
+    return frame
+
+
+def fields(at_s, r):
+    """The fields of a frame, read one after the other."""
     version = r.byte()
     if version not in (1, 2):
         raise Bad(f"version {version}")
@@ -98,6 +111,4 @@ def decode(at_s, line):
     if table:
         r.at += 16
         r.varint()
-    if r.at != len(record):
-        raise Bad("length")
     return Frame(at_s, sequence, now_ms, MODES[mode], f_uhz, ppm, set_point, faults, misfits, table)

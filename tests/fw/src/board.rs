@@ -13,6 +13,12 @@ use std::io;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
+use ed25519_dalek::{Signer as _, SigningKey};
+use update::class::DeviceClass;
+use update::container::{Header, Validity};
+use update::key::DEVELOPMENT_SEED;
+
+use crate::costs::{self, CostError, Figures};
 use crate::images::{self, ImageError, TARGET};
 use crate::root;
 use crate::table_fit::Built;
@@ -39,6 +45,9 @@ pub enum BoardError {
     /// An image.
     #[error(transparent)]
     Image(#[from] ImageError),
+    /// A figure differs from what is committed.
+    #[error(transparent)]
+    Cost(#[from] CostError),
     /// A tool or a file.
     #[error("{what}: {source}")]
     Io {
@@ -109,12 +118,47 @@ fn built(folder: PathBuf) -> Result<PathBuf, BoardError> {
     Ok(folder)
 }
 
+/// Containers that the scenarios send: name, table, class, version.
+const CONTAINERS: [(&str, &str, DeviceClass, u32); 3] = [
+    (
+        "first",
+        "gb-uni-ade7953",
+        DeviceClass::reference(false, false),
+        1,
+    ),
+    ("second", "gb-uni", DeviceClass::reference(false, false), 2),
+    ("foreign", "gb-bi", DeviceClass::reference(true, false), 3),
+];
+
+/// Writes the containers, signed with the key of experiments, which the images trust.
+fn containers(folder: &Path) -> Result<(), BoardError> {
+    fs::create_dir_all(folder).map_err(io_error("folder of the containers"))?;
+    let key = SigningKey::from_bytes(&DEVELOPMENT_SEED);
+    for (name, table, class, version) in CONTAINERS {
+        let path = root().join(format!("firmware/tables/{table}.bin"));
+        let table = fs::read(&path).map_err(io_error(path.display().to_string()))?;
+        let header = Header {
+            table_len: table.len() as u32,
+            class,
+            version,
+            validity: Validity::ALWAYS,
+        };
+        let mut bytes = [&header.write()[..], &table].concat();
+        let signature = key.sign(&bytes);
+        bytes.extend(signature.to_bytes());
+        let path = folder.join(format!("{name}.hfsc"));
+        fs::write(&path, bytes).map_err(io_error(path.display().to_string()))?;
+    }
+    Ok(())
+}
+
 /// Plays scenarios, all that run by themselves unless some are named, and repeats them on the host.
-/// `images` is a folder of ELF files in place of what is built now.
+/// `images` is a folder of ELF files in place of what is built now. `bless` takes the deepest stacks
+/// over, which all scenarios that run by themselves give.
 ///
 /// # Errors
 /// A scenario does not hold, host and image differ, or a tool is missing.
-pub fn play(scenarios: &[String], images: Option<PathBuf>) -> Result<(), BoardError> {
+pub fn play(scenarios: &[String], images: Option<PathBuf>, bless: bool) -> Result<(), BoardError> {
     let folder = root().join("target/board");
     let tapes = folder.join("tapes");
     match fs::remove_dir_all(&tapes) {
@@ -130,6 +174,7 @@ pub fn play(scenarios: &[String], images: Option<PathBuf>) -> Result<(), BoardEr
         Some(images) => images,
         None => built(folder.join("images"))?,
     };
+    containers(&tapes.join("containers"))?;
     let (images, tapes_text) = (images.to_string_lossy(), tapes.to_string_lossy());
     let mut arguments = vec![PROGRAM, &images, "firmware/tables", &tapes_text];
     arguments.extend(scenarios.iter().map(String::as_str));
@@ -138,7 +183,27 @@ pub fn play(scenarios: &[String], images: Option<PathBuf>) -> Result<(), BoardEr
         1 => return Err(BoardError::Fails),
         _ => return Err(BoardError::Tool(PROGRAM.to_owned())),
     }
-    if own { compare(&tapes) } else { Ok(()) }
+    if !own {
+        return Ok(());
+    }
+    if scenarios.is_empty() {
+        stacks(&tapes, bless)?;
+    }
+    compare(&tapes)
+}
+
+/// Compares the deepest stack of each image with what is committed, or takes it over.
+fn stacks(folder: &Path, bless: bool) -> Result<(), BoardError> {
+    let path = folder.join("stacks");
+    let text = fs::read_to_string(&path).map_err(io_error(path.display().to_string()))?;
+    let mut figures = Figures::default();
+    figures.note(&costs::compiler());
+    for (image, bytes) in text.lines().filter_map(|line| line.split_once(' ')) {
+        let name = format!("{image} stack, deepest of all scenarios");
+        figures.line(&name, bytes.parse().unwrap_or(u32::MAX), "bytes", None);
+    }
+    print!("{}", figures.text());
+    Ok(figures.check("board.txt", bless)?)
 }
 
 /// Repeats every tape of a folder on the host.
@@ -148,6 +213,9 @@ fn compare(tapes: &Path) -> Result<(), BoardError> {
     for entry in fs::read_dir(tapes).map_err(io_error("folder of the tapes"))? {
         let path = entry.map_err(io_error("folder of the tapes"))?.path();
         let name = path.file_stem().unwrap_or_default().to_string_lossy();
+        if path.extension().is_none_or(|extension| extension != "tape") {
+            continue;
+        }
         let image = name.rsplit('.').next().unwrap_or_default();
         let Some(product) = Built::all().into_iter().find(|b| b.image.name == image) else {
             continue;

@@ -129,7 +129,7 @@ pub fn build_with(image: Image, target: &str, table: Option<&Path>) -> Result<Pa
         None => command.env_remove(TABLE_VARIABLE),
     };
     let output = command
-        .args(["build", "--package", "firmware", "--profile", "firmware"])
+        .args(["build", "--package", "product", "--profile", "firmware"])
         .args(["--target", target, "--bin", image.binary])
         .args(["--features", image.features])
         .args(if image.log {

@@ -105,6 +105,9 @@ enum Command {
         /// Folder of images built before, NAME.elf, in place of what is built now
         #[arg(long, value_name = "FOLDER")]
         images: Option<PathBuf>,
+        /// Take the deepest stacks over
+        #[arg(long, conflicts_with_all = ["scenarios", "images"])]
+        bless: bool,
     },
     /// Measure flash, RAM, stack and instructions, and compare with firmware/expected
     Costs {
@@ -172,9 +175,11 @@ fn main() -> ExitCode {
             out,
             bless,
         } => c_interface((scenarios, ticks.max(1)), &root().join(out), bless),
-        Command::Board { scenarios, images } => {
-            board::play(&scenarios, images).map_err(AnyError::from)
-        }
+        Command::Board {
+            scenarios,
+            images,
+            bless,
+        } => board::play(&scenarios, images, bless).map_err(AnyError::from),
         Command::Costs { bless } => measure(bless),
     };
     match result {
@@ -186,7 +191,7 @@ fn main() -> ExitCode {
             let in_c = matches!(error.downcast_ref(), Some(CApiError::Differs(_)));
             let on_board = matches!(
                 error.downcast_ref(),
-                Some(BoardError::Fails | BoardError::Differs { .. })
+                Some(BoardError::Fails | BoardError::Differs { .. } | BoardError::Cost(_))
             );
             let no = wrong || differs || in_c || on_board;
             ExitCode::from(if no { 1 } else { 2 })

@@ -13,7 +13,9 @@ use settings::values::Build;
 /// The charger's key.
 pub(crate) const KEY: DeviceKey = DeviceKey::new([0x42; 32]);
 
-struct Around;
+struct Around {
+    may_write: bool,
+}
 
 impl Facts for Around {
     fn build(&self) -> &str {
@@ -30,6 +32,10 @@ impl Facts for Around {
 
     fn frame(&self) -> Option<Frame> {
         None
+    }
+
+    fn may_write(&self) -> bool {
+        self.may_write
     }
 }
 
@@ -52,6 +58,7 @@ pub(crate) struct Bench {
     now_ms: u32,
     sealed: Option<Sealed>,
     answer: Vec<u8>,
+    around: Around,
 }
 
 impl Bench {
@@ -64,7 +71,13 @@ impl Bench {
             now_ms: u32::MAX - 20_000,
             sealed: None,
             answer: Vec::new(),
+            around: Around { may_write: true },
         }
+    }
+
+    /// Whether the flash may be written from now on.
+    pub(crate) fn may_write(&mut self, may_write: bool) {
+        self.around.may_write = may_write;
     }
 
     /// Ticks for so long.
@@ -87,7 +100,7 @@ impl Bench {
         let mut record = [0; RECORD_MAX];
         let record = write_ask(9, ask, &mut record);
         for byte in encode(record, &mut [0; FRAME_MAX]) {
-            self.device.take(*byte, self.now_ms, &mut Around);
+            self.device.take(*byte, self.now_ms, &mut self.around);
         }
         let mut collector = Collector::EMPTY;
         while let Some(byte) = self.device.to_send() {

@@ -8,29 +8,40 @@ use std::rc::Rc;
 use embedded_hal::digital::{ErrorType as PinError, OutputPin};
 use embedded_hal::pwm::{ErrorType as PwmError, SetDutyCycle};
 use firmware::board::{Board, Parts, Runner};
-use firmware::charger::{ChargerConfig, Installation, StartDelay, Watchdog, reference};
-use firmware::dispatch::bidirectional::Bidirectional;
+use firmware::charger::{MeterFacts, Watchdog, reference};
+use firmware::dispatch::Dispatch;
 use firmware::dispatch::car::{CarSense, CarState};
-use firmware::dispatch::contactor::ContactorTimes;
-use firmware::dispatch::fleet::Threshold;
-use firmware::dispatch::power_line::PowerLine;
-use firmware::dispatch::unidirectional::Unidirectional;
-use firmware::dispatch::{Dispatch, Limits};
-use firmware::fault::ResetCause;
+use firmware::fault::{Faults, ResetCause};
 use firmware::frequency::zero_crossing::{Captured, Captures};
-use firmware::response::LevelOffset;
+use firmware::table::Direction;
+use product::desk::{CONTAINER_MAX, Desk, judge};
+use product::output;
+use service::device::Device;
+use settings::config::{Board as Chip, Judged, Limited};
+use settings::orders::Ordered;
+use settings::store::Store;
+use settings::testing::{Memory, RANGE, blank};
+use settings::values::{Build, Values};
+use update::class::DeviceClass;
+use update::key::PublicKey;
+use update::layout::Layout;
+use update::mapped::MemoryFlash;
+use update::slots::Slots;
 
 /// Bytes of a chip's UID.
 const UID_LEN: usize = 12;
+/// Bytes of the name of the build.
+const BUILD_LEN: usize = 32;
+/// Bytes of a slot on the board.
+const SLOT_LEN: usize = 16 * 1024;
+/// Bytes of the board's ring of what came.
+const RING_LEN: usize = 512;
 /// Bytes of an item: its kind and a word.
 const ITEM_LEN: usize = 5;
 /// Conversions of the pilot in one measurement of the reference board.
 const PILOT_SAMPLES: usize = 320;
 /// Steps of the pilot's timer.
 const PWM_STEPS: u16 = 42_000;
-/// Current of the reference charger \[mA\], and power of the reference power stage \[W\].
-const CABLE_MA: u32 = 32_000;
-const SPAN_W: u32 = 28_000;
 
 /// How much was equal.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
@@ -49,6 +60,7 @@ pub struct Done {
 /// | S | status of the captures' timer | whether a capture was lost; whether there is one |
 /// | C | the capture | |
 /// | A | the converter's result | the measurement of the pilot |
+/// | D | items left of the receiver's DMA, and above 16 bits the byte at the reader's place | the loop |
 /// | U | status of the serial line | whether it takes a byte |
 /// | B | the byte sent | |
 #[derive(Debug, Default)]
@@ -88,20 +100,34 @@ fn differ(tape: &mut Items, what: String) {
     tape.at = tape.items.len();
 }
 
-struct Lines(Tape);
+struct Lines {
+    tape: Tape,
+    /// Place of the next byte in the ring.
+    next: usize,
+}
 
 impl Board for Lines {
     fn now_us(&mut self) -> u32 {
-        next(&self.0, b'T')
+        next(&self.tape, b'T')
+    }
+
+    fn receive(&mut self) -> Option<u8> {
+        let word = next(&self.tape, b'D') as usize;
+        let filled = RING_LEN.saturating_sub(word & 0xFFFF) % RING_LEN;
+        if word == 0 || self.next == filled {
+            return None;
+        }
+        self.next = (self.next + 1) % RING_LEN;
+        Some((word >> 16) as u8)
     }
 
     fn send(&mut self, byte: u8) -> bool {
         // Bit 7: the transmitter's register is empty.
-        if next(&self.0, b'U') & 1 << 7 == 0 {
+        if next(&self.tape, b'U') & 1 << 7 == 0 {
             return false;
         }
-        let sent = next(&self.0, b'B');
-        let mut tape = self.0.borrow_mut();
+        let sent = next(&self.tape, b'B');
+        let mut tape = self.tape.borrow_mut();
         if tape.at < tape.items.len() {
             tape.bytes += 1;
             if sent != u32::from(byte) {
@@ -192,13 +218,31 @@ fn serial_of(uid: &[u8; UID_LEN]) -> u32 {
     lot.wrapping_mul(0x0100_0193) ^ die ^ (u32::from(wafer) << 8)
 }
 
-/// Repeats a run from power-on on.
+/// What the image was built for and as.
+#[derive(Debug, Clone, Copy)]
+struct Image {
+    build: Build,
+    name: &'static str,
+    serial: u32,
+}
+
+impl Image {
+    fn class(&self) -> DeviceClass {
+        let bidirectional = self.build.direction == Direction::Bidirectional;
+        DeviceClass::reference(bidirectional, self.build.meter == 1)
+    }
+}
+
+/// Repeats a run from power-on on, of a charger whose flash was never written.
 ///
 /// # Errors
 /// The first difference, or why the tape is none.
 pub fn repeat(tape: &[u8], table: &[u8], bidirectional: bool) -> Result<Done, String> {
-    let Some((uid, items)) = tape.split_first_chunk::<UID_LEN>() else {
+    let Some((uid, rest)) = tape.split_first_chunk::<UID_LEN>() else {
         return Err("the tape has no UID".to_owned());
+    };
+    let Some((name, items)) = rest.split_first_chunk::<BUILD_LEN>() else {
+        return Err("the tape has no build".to_owned());
     };
     if items.len() < ITEM_LEN || !items.len().is_multiple_of(ITEM_LEN) {
         return Err("the tape has no whole number of items".to_owned());
@@ -211,41 +255,27 @@ pub fn repeat(tape: &[u8], table: &[u8], bidirectional: bool) -> Result<Done, St
         items: items.collect(),
         ..Items::default()
     }));
-    let serial = serial_of(uid);
-    let installation = if bidirectional {
-        Installation::REFERENCE_BIDIRECTIONAL
-    } else {
-        Installation::REFERENCE_UNIDIRECTIONAL
+    let name = String::from_utf8_lossy(name);
+    let image = Image {
+        build: Build {
+            direction: if bidirectional {
+                Direction::Bidirectional
+            } else {
+                Direction::Unidirectional
+            },
+            meter: 0,
+        },
+        // For the rest of a program that repeats some runs and ends.
+        name: Box::leak(name.trim_end_matches('\0').into()),
+        serial: serial_of(uid),
     };
-    let config = ChargerConfig {
-        level_offset: LevelOffset::of_serial(serial),
-        start_delay: StartDelay::street(serial).after_starts(0),
-        installation: Some(installation),
-        ..ChargerConfig::DEFAULT
-    };
+    let values = Values::defaults(image.build);
     let turns = if bidirectional {
-        let limits = Limits::all(SPAN_W);
-        let stage = PowerLine::new(Line, SPAN_W);
-        play(
-            &shared,
-            Bidirectional::new(stage, limits, limits),
-            table,
-            config,
-        )
+        play(&shared, output::power_line(Line, &values), table, image)
     } else {
-        let charger = Unidirectional::new(
-            Line,
-            Coil,
-            ContactorTimes::DEFAULT,
-            Threshold::of_serial(serial),
-            Limits::all(CABLE_MA),
-        );
-        play(
-            &shared,
-            charger.with_car(Pilot(shared.clone())),
-            table,
-            config,
-        )
+        let car = Pilot(shared.clone());
+        let charger = output::pilot(Line, Coil, car, image.serial, &values);
+        play(&shared, charger, table, image)
     }?;
     let tape = shared.borrow();
     match &tape.wrong {
@@ -258,28 +288,56 @@ pub fn repeat(tape: &[u8], table: &[u8], bidirectional: bool) -> Result<Done, St
 }
 
 /// Goes round until the tape is at its end; how often.
-fn play<D: Dispatch>(
+fn play<D: Dispatch + Limited>(
     tape: &Tape,
-    dispatch: D,
+    dispatch: Ordered<D>,
     table: &[u8],
-    config: ChargerConfig,
+    image: Image,
 ) -> Result<usize, String> {
+    let cells = blank();
+    let store = Store::open(Memory(&cells), RANGE, image.build);
+    let device = Device::new(store.map_err(|error| format!("{error:?}"))?);
+    let values = *device.in_force();
     let source = Captured::new(Stamps(tape.clone())).map_err(|error| format!("{error:?}"))?;
+    let source = Judged::new(source, &values);
+    let mut flash = vec![0xFF; 2 * SLOT_LEN];
+    let layout = Layout::new(0, SLOT_LEN as u32, SLOT_LEN as u32);
+    let layout = layout.ok_or("the slots cannot be")?;
+    let meter = MeterFacts::of(&source);
+    let judge = judge(PublicKey::DEVELOPMENT, image.class(), &values, meter);
+    let slots = Slots::start(MemoryFlash(&mut flash), layout, judge);
     let parts = Parts {
-        board: Lines(tape.clone()),
+        board: Lines {
+            tape: tape.clone(),
+            next: 0,
+        },
         source,
         dispatch,
         watchdog: Dog,
         cause: ResetCause::PowerOn,
     };
+    let config = values.charger(&Chip {
+        serial: image.serial,
+        starts: 0,
+        faults: Faults::NONE,
+    });
     let mut runner = Runner::new(parts, table, config);
+    let mut collected = [0; CONTAINER_MAX];
+    let mut desk = Desk::new(
+        Some(device),
+        slots,
+        runner.table(),
+        &mut collected,
+        image.name,
+        image.serial,
+    );
     let mut turns = 0;
     let left = |tape: &Tape| {
         let tape = tape.borrow();
         tape.at < tape.items.len()
     };
     while left(tape) {
-        runner.turn();
+        runner.turn_with(&mut desk);
         turns += 1;
     }
     Ok(turns)
@@ -292,7 +350,7 @@ mod tests {
 
     /// A tape of turns 1 ms apart, in which nothing is captured and the line is never free.
     fn silent(turns: u32) -> Vec<u8> {
-        let mut tape = vec![0; UID_LEN];
+        let mut tape = vec![0; UID_LEN + BUILD_LEN];
         let mut put = |kind: u8, word: u32| {
             tape.push(kind);
             tape.extend(word.to_le_bytes());
@@ -301,6 +359,7 @@ mod tests {
             put(b'T', 1_000 * n);
             put(b'S', 0);
             put(b'S', 0);
+            put(b'D', RING_LEN as u32);
             // From the first tick on there is a frame to send.
             if n >= 100 {
                 put(b'U', 0);
@@ -324,7 +383,7 @@ mod tests {
     #[test]
     fn another_order_and_another_byte_are_named() {
         let mut tape = silent(99);
-        tape[UID_LEN] = b'S';
+        tape[UID_LEN + BUILD_LEN] = b'S';
         let wrong = repeat(&tape, &[], false).unwrap_err();
         assert_eq!(wrong, "item 1: asked for T, the image for S");
         // A frame that begins with no code of COBS.

@@ -1,11 +1,15 @@
-//! Link arguments, memory map and table of the images.
+//! Link arguments, memory map, table and identity of the images.
 //!
 //! Nothing here applies to the host or to a build of the library alone. The memory map is copied
 //! into the build's own folder, so that the linker finds it from whatever folder cargo was started
 //! in.
 
 use std::path::{Path, PathBuf};
+use std::process::Command;
 use std::{env, fs, io};
+
+use base64::Engine as _;
+use base64::engine::general_purpose::STANDARD;
 
 /// The table that `holdfast` carries unless `HOLDFAST_TABLE` names another, from the workspace's
 /// root: for its direction, and for its meter.
@@ -17,7 +21,7 @@ fn shipped_table() -> String {
 }
 
 /// Boards and their memory maps, from the package's folder.
-const BOARDS: &str = "images/boards";
+const BOARDS: &str = "boards";
 /// The map of the board that is built, in the build's own folder.
 const MAP: &str = "board.x";
 /// Map of the reference board, which is built unless a feature has the name of another map.
@@ -34,7 +38,7 @@ fn main() -> io::Result<()> {
     }
     let folder = |name: &str| env::var_os(name).map(PathBuf::from).unwrap_or_default();
     let package = folder("CARGO_MANIFEST_DIR");
-    let root = package.join("..");
+    let root = package.join("../..");
     let out = folder("OUT_DIR");
     let arm = is("CARGO_CFG_TARGET_ARCH", "arm");
     let map = package.join(BOARDS).join(if arm {
@@ -62,7 +66,76 @@ fn main() -> io::Result<()> {
     if env::var_os("CARGO_FEATURE_LOG").is_some() {
         println!("cargo::rustc-link-arg-bins=-Tdefmt.x");
     }
-    table(&root, &out)
+    table(&root, &out)?;
+    let (trusted, note) = trusted(&root)?;
+    let build = format!("{} {}{note}", env!("CARGO_PKG_VERSION"), commit(&root));
+    let built = format!(
+        "pub(crate) const BUILD: &str = {build:?};\n\
+         pub(crate) const TRUSTED: update::key::PublicKey = update::key::PublicKey{trusted};\n"
+    );
+    fs::write(out.join("built.rs"), built)
+}
+
+/// What git says in the workspace's root.
+fn git(root: &Path, arguments: &[&str]) -> Option<String> {
+    let output = Command::new("git")
+        .current_dir(root)
+        .args(arguments)
+        .output();
+    let output = output.ok().filter(|output| output.status.success())?;
+    Some(String::from_utf8_lossy(&output.stdout).trim().to_owned())
+}
+
+/// The commit that is built: eight digits, seven and a `+` where what the images are made of differs
+/// from it, `unknown` outside a checkout.
+fn commit(root: &Path) -> String {
+    let Some(commit) = git(root, &["rev-parse", "--short=8", "HEAD"]) else {
+        return "unknown".to_owned();
+    };
+    // Asked again when a commit is made or left, and when sources change.
+    for name in ["HEAD", "logs/HEAD"] {
+        if let Some(path) = git(root, &["rev-parse", "--git-path", name]) {
+            let path = root.join(path);
+            if path.exists() {
+                println!("cargo::rerun-if-changed={}", path.display());
+            }
+        }
+    }
+    let made_of = ["firmware", "memory.x", "Cargo.toml", "Cargo.lock"];
+    for name in made_of {
+        println!("cargo::rerun-if-changed={}", root.join(name).display());
+    }
+    let changed = ["status", "--porcelain", "--untracked-files=no", "--"];
+    match git(root, &[&changed[..], &made_of].concat()) {
+        Some(text) if text.is_empty() => commit,
+        _ => format!("{}+", commit.get(..7).unwrap_or(&commit)),
+    }
+}
+
+/// The public key whose tables the charger takes by update, as Rust, and what the build's name says
+/// of it: that in the file that `HOLDFAST_TRUST` names, or the key of experiments, which is told.
+fn trusted(root: &Path) -> io::Result<(String, &'static str)> {
+    println!("cargo::rerun-if-env-changed=HOLDFAST_TRUST");
+    let Some(path) = env::var_os("HOLDFAST_TRUST") else {
+        println!(
+            "cargo::warning=the image trusts the key of experiments, whose private half everybody \
+             has; HOLDFAST_TRUST=FILE names another"
+        );
+        return Ok(("::DEVELOPMENT".to_owned(), " dev-key"));
+    };
+    let path = root.join(path);
+    println!("cargo::rerun-if-changed={}", path.display());
+    let bad = |what: String| {
+        let message = format!("HOLDFAST_TRUST {}: {what}", path.display());
+        io::Error::new(io::ErrorKind::InvalidData, message)
+    };
+    let text = fs::read_to_string(&path).map_err(|error| bad(error.to_string()))?;
+    let bytes = STANDARD.decode(text.trim());
+    let bytes = bytes.map_err(|error| bad(error.to_string()))?;
+    let key: [u8; 32] = bytes
+        .try_into()
+        .map_err(|_| bad("a public key has 32 bytes".to_owned()))?;
+    Ok((format!("({key:?})"), ""))
 }
 
 /// The map of the board that is built: that with the name of an enabled feature, or the reference
