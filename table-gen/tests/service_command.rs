@@ -182,3 +182,38 @@ fn what_is_wrong_is_named() {
     let limit = ["limit", "site", "80001", "--key", first];
     refused(&nowhere, &limit, 2, &["0 to 80000", "none"]);
 }
+
+#[test]
+fn a_signed_table_is_sent_and_a_forged_one_is_refused() {
+    let charger = StandIn::start().unwrap();
+    let port = charger.path();
+    let folder = tempfile::tempdir().unwrap();
+    // The key of experiments: 32 bytes of 0x48.
+    let key = folder.path().join("dev.key");
+    std::fs::write(&key, "SEhISEhISEhISEhISEhISEhISEhISEhISEhISEhISEg=\n").unwrap();
+    let container = folder.path().join("table.hfsc");
+    let table = concat!(env!("CARGO_MANIFEST_DIR"), "/../firmware/tables/gb-uni.bin");
+    let signed = Command::new(env!("CARGO_BIN_EXE_table-gen"))
+        .args(["sign", table, "--product", "holdfast", "--version", "3"])
+        .arg("--key")
+        .arg(&key)
+        .arg("--out")
+        .arg(&container)
+        .output()
+        .unwrap();
+    let errors = String::from_utf8_lossy(&signed.stderr);
+    assert!(signed.status.success(), "{errors}");
+    let name = container.to_str().unwrap();
+    let mut bytes = std::fs::read(&container).unwrap();
+    bytes[40] ^= 1;
+    let forged = folder.path().join("forged.hfsc");
+    std::fs::write(&forged, &bytes).unwrap();
+    let forged = forged.to_str().unwrap();
+    refused(port, &["install", forged], 1, &["not signed by the key"]);
+    assert_eq!(read(port, "tables")["from_next_start"], Value::Null);
+    done(port, &["install", name]);
+    let tables = read(port, "tables");
+    assert_eq!(tables["from_next_start"], 3);
+    assert_eq!(tables["in_force"], Value::Null);
+    refused(port, &["install", "missing.hfsc"], 2, &["missing.hfsc"]);
+}

@@ -9,6 +9,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
+use firmware::charger::reference::products;
 use firmware::telemetry::{self, Frame, TELEMETRY_VERSION, TableId, WireSetPoint};
 use rustix::fs::{OFlags, fcntl_setfl};
 use rustix::pty::{OpenptFlags, grantpt, openpt, ptsname, unlockpt};
@@ -17,6 +18,13 @@ use service::facts::Facts;
 use settings::store::Store;
 use settings::testing::{Cells, Memory, RANGE, blank};
 use settings::values::Build;
+use update::class::DeviceClass;
+use update::device::Device as Judge;
+use update::key::PublicKey;
+use update::layout::Layout;
+use update::mapped::MemoryFlash;
+use update::slots::Slots;
+use update::wire::{Inbox, Reason, Said, read_step, write_said};
 
 /// Its tick.
 const TICK: Duration = Duration::from_millis(100);
@@ -69,12 +77,18 @@ impl Drop for StandIn {
     }
 }
 
-struct Around {
+/// Bytes of a slot, and of the longest container that it takes.
+const SLOT_LEN: usize = 4_096;
+const CONTAINER_MAX: usize = 3_072;
+
+struct Around<'m> {
     ticks: u32,
     now_ms: u32,
+    inbox: Inbox<'m>,
+    slots: Slots<MemoryFlash<'m>, PublicKey>,
 }
 
-impl Facts for Around {
+impl Facts for Around<'_> {
     fn build(&self) -> &str {
         "stand-in"
     }
@@ -85,6 +99,14 @@ impl Facts for Around {
 
     fn table(&self) -> Option<TableId> {
         None
+    }
+
+    fn update(&mut self, sent: &[u8], answer: &mut [u8]) -> Option<usize> {
+        let said = match read_step(sent) {
+            Some(step) => self.inbox.step(&mut self.slots, &step, true),
+            None => Said::Refused(Reason::MALFORMED),
+        };
+        write_said(&said, answer)
     }
 
     fn frame(&self) -> Option<Frame> {
@@ -115,9 +137,24 @@ fn run(mut line: File, stop: &AtomicBool) {
     let Some(mut service) = device(&cells) else {
         return;
     };
+    let (mut flash, mut collected) = (vec![0xFF; 2 * SLOT_LEN], vec![0; CONTAINER_MAX]);
+    let Some(layout) = Layout::new(0, SLOT_LEN as u32, SLOT_LEN as u32) else {
+        return;
+    };
+    let [product, ..] = products();
+    let judge = Judge {
+        trusted: PublicKey::DEVELOPMENT,
+        class: DeviceClass::reference(false, false),
+        installation: product.installation,
+        meter: product.meter,
+        filter_ticks: 1,
+    };
+    // Its slots know nothing of its starts: what was installed waits for ever.
     let mut around = Around {
         ticks: 0,
         now_ms: 0,
+        inbox: Inbox::new(&mut collected),
+        slots: Slots::start(MemoryFlash(&mut flash), layout, judge),
     };
     let mut next = Instant::now() + TICK;
     let mut bytes = [0; 256];
@@ -149,10 +186,7 @@ fn run(mut line: File, stop: &AtomicBool) {
                 return;
             };
             service = again;
-            around = Around {
-                ticks: 0,
-                now_ms: 0,
-            };
+            (around.ticks, around.now_ms) = (0, 0);
         }
         if length == 0 {
             std::thread::sleep(Duration::from_millis(2));

@@ -11,6 +11,7 @@ use lab::telemetry_lines;
 use live::feed::Feed;
 use live::server::{Options, Page};
 use live::source::{self, Pace};
+use service_client::introductions::{self, Introductions};
 
 /// Fastest and slowest that a recording is played.
 const SPEED: [f64; 2] = [0.01, 1000.0];
@@ -49,15 +50,24 @@ pub(super) fn run(args: &MonitorArgs) -> Result<(), Failure> {
     lines(args, source)
 }
 
-/// The bytes of a port, a recording or standard input.
+/// The telemetry of a port, a recording or standard input. Who the charger says that it is goes to
+/// standard error, at first and when it has changed.
 fn open(source: &Path) -> Result<Box<dyn Read + Send>, Failure> {
-    if source.as_os_str() == "-" {
-        return Ok(Box::new(std::io::stdin()));
-    }
-    match File::open(source) {
-        Ok(file) => Ok(Box::new(file)),
-        Err(error) => Err(failed(source, error)),
-    }
+    let stream: Box<dyn Read + Send> = if source.as_os_str() == "-" {
+        Box::new(std::io::stdin())
+    } else {
+        Box::new(File::open(source).map_err(|error| failed(source, error))?)
+    };
+    let name = source.display().to_string();
+    let mut last = String::new();
+    let found = move |who: &::service::message::Identity| {
+        let line = introductions::line(who);
+        if line != last {
+            eprintln!("{name}: {line}");
+            last = line;
+        }
+    };
+    Ok(Box::new(Introductions::new(stream, Box::new(found))))
 }
 
 fn failed(source: &Path, error: impl std::fmt::Display) -> Failure {

@@ -45,6 +45,17 @@ enum Action {
     Provision(KeyArgs),
     /// Replace the key
     NewKey(NewKeyArgs),
+    /// Which table that came by update is in force, and which waits for the next start
+    Tables(OutputArgs),
+    /// Send a signed table, to be in force from the next start on
+    Install(InstallArgs),
+}
+
+#[derive(Debug, clap::Args)]
+struct InstallArgs {
+    /// Container written by `sign`
+    #[arg(value_name = "FILE")]
+    container: PathBuf,
 }
 
 #[derive(Debug, clap::Args)]
@@ -153,6 +164,8 @@ pub(super) fn run(args: &ServiceArgs) -> Result<(), Failure> {
             let (key, new) = (read_key(&keys.key.key)?, read_key(&keys.new)?);
             return Ok(Client::open(&args.port)?.new_key(&key, &new)?);
         }
+        Action::Tables(out) => return tables(&mut Client::open(&args.port)?, *out),
+        Action::Install(install) => return self::install(args, install),
         Action::Set(set) => (&set.key, Order::Settings(pairs(&set.settings)?)),
         Action::Defaults(key) => (key, Order::Defaults),
         Action::Limit(limit) => {
@@ -244,6 +257,31 @@ fn identity(client: &mut Client, out: OutputArgs) -> Result<(), Failure> {
         "settings": origin,
     });
     show(&value, out)
+}
+
+fn tables(client: &mut Client, out: OutputArgs) -> Result<(), Failure> {
+    let found = client.update_state()?;
+    let value = json!({
+        "in_force": found.running,
+        "slot": found.running.map(|_| if found.slot == 0 { "A" } else { "B" }),
+        "on_trial": found.running.map(|_| !found.confirmed),
+        "from_next_start": found.waiting,
+        "container_max": found.room,
+    });
+    show(&value, out)
+}
+
+fn install(args: &ServiceArgs, install: &InstallArgs) -> Result<(), Failure> {
+    let path = &install.container;
+    let bytes = std::fs::read(path)
+        .map_err(|error| Failure::BadInput(format!("{}: {error}", path.display())))?;
+    let now = std::time::SystemTime::now().duration_since(std::time::UNIX_EPOCH);
+    let now_s = now.ok().and_then(|now| u32::try_from(now.as_secs()).ok());
+    let version = Client::open(&args.port)?.install(&bytes, now_s)?;
+    output::line(format_args!(
+        "version {version} is in force from the next start on, and kept once it has run well"
+    ));
+    Ok(())
 }
 
 fn status(client: &mut Client, out: OutputArgs) -> Result<(), Failure> {
