@@ -86,8 +86,8 @@ fn git(root: &Path, arguments: &[&str]) -> Option<String> {
     Some(String::from_utf8_lossy(&output.stdout).trim().to_owned())
 }
 
-/// The commit that is built: eight digits, seven and a `+` where what the images are made of differs
-/// from it, `unknown` outside a checkout.
+/// The commit that is built: eight digits, seven and a `+` where what the images are made of
+/// differs from it, `unknown` outside a checkout.
 fn commit(root: &Path) -> String {
     let Some(commit) = git(root, &["rev-parse", "--short=8", "HEAD"]) else {
         return "unknown".to_owned();

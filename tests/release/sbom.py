@@ -50,8 +50,10 @@ def main():
             product = {**component, "type": "firmware", "name": "holdfast"}
             continue
         checksum = sums[name, version]
-        assert checksum, f"{name} {version} has no checksum in Cargo.lock"
-        component["hashes"] = [{"alg": "SHA-256", "content": checksum}]
+        # A package of this workspace stands with its folder, and has no checksum.
+        assert checksum or "(" in package, f"{name} {version} has no checksum in Cargo.lock"
+        if checksum:
+            component["hashes"] = [{"alg": "SHA-256", "content": checksum}]
         if component not in components:
             components.append(component)
     assert product and len(components) > 5, "the tree is not that of an image"

@@ -5,8 +5,8 @@
 //! Flash of one bank stops the processor while it is erased, and so the loop: no tick, no look at
 //! the car. Outputs stay as they are, for timers and pins go on. So
 //!
-//! - what writes settings or keys, and a table, waits until the charger rests ([`rests`]: nothing is
-//!   given to the grid, and nothing is held or released) and offers nothing ([`is_idle`]);
+//! - what writes settings or keys, and a table, waits until the charger rests ([`rests`]: nothing
+//!   is given to the grid, and nothing is held or released) and offers nothing ([`is_idle`]);
 //! - a block of challenges, written once in 64 of them, waits for rest alone. One of about forty
 //!   such writes erases a sector: then a car is not looked at for half a second.
 //!

@@ -5,8 +5,8 @@
 //! | [`output`] | what drives the car or the power stage, by the settings |
 //! | [`desk`] | the service link beside the charger: settings, orders, updates, who it is |
 //!
-//! The images are `holdfast.rs` with a board of `boards/`; `pil.rs` and `bare.rs` are for measuring.
-//! Nothing here allocates, recurses or panics; nothing is `unsafe`.
+//! The images are `holdfast.rs` with a board of `boards/`; `pil.rs` and `bare.rs` are for
+//! measuring. Nothing here allocates, recurses or panics; nothing is `unsafe`.
 #![no_std]
 #![forbid(unsafe_code)]
 

@@ -134,8 +134,9 @@ impl<F: MultiwriteNorFlash> Device<F> {
             .take_if(|at| now_ms.wrapping_sub(*at) >= GAP_MS);
     }
 
-    /// To be called while [`Facts::may_count`] says yes: sets the next block of challenges aside, if the
-    /// one in use is used up soon. A charger that was asked for none in this run writes nothing.
+    /// To be called while [`Facts::may_count`] says yes: sets the next block of challenges aside,
+    /// if the one in use is used up soon. A charger that was asked for none in this run writes
+    /// nothing.
     pub fn look_ahead(&mut self) {
         if let Some(number) = self.next
             && number < self.ceiling

@@ -24,8 +24,8 @@ pub trait Facts {
         true
     }
 
-    /// The same for a block of challenges, which are written once in [`crate::device::BLOCK`] orders
-    /// and seldom erase a page.
+    /// The same for a block of challenges, which is written once in [`crate::device::BLOCK`] orders
+    /// and seldom erases a page.
     fn may_count(&self) -> bool {
         self.may_write()
     }

@@ -3,8 +3,8 @@
 //! An asker begins with the container's length, sends its bytes in parts, each with its place, and
 //! asks for it to be installed. Every step is answered. A part that is sent again, since its answer
 //! was lost, is answered as the first time. Nothing is written to flash before the whole container
-//! has been verified, so whoever can send bytes cannot wear out the flash, or make the charger stand
-//! still.
+//! has been verified, so whoever can send bytes cannot wear out the flash, or make the charger
+//! stand still.
 //!
 //! Steps and answers are postcard records; who carries them is not this module's business.
 

@@ -1,5 +1,5 @@
-//! A container over a line: in parts, again, out of turn, forged; the flash is touched by a whole and
-//! signed one alone.
+//! A container over a line: in parts, again, out of turn, forged; the flash is touched by a whole
+//! and signed one alone.
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on fails")]
 
 mod common;

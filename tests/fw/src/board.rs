@@ -153,8 +153,8 @@ fn containers(folder: &Path) -> Result<(), BoardError> {
 }
 
 /// Plays scenarios, all that run by themselves unless some are named, and repeats them on the host.
-/// `images` is a folder of ELF files in place of what is built now. `bless` takes the deepest stacks
-/// over, which all scenarios that run by themselves give.
+/// `images` is a folder of ELF files in place of what is built now. `bless` takes over the deepest
+/// stacks, which all scenarios that run by themselves give.
 ///
 /// # Errors
 /// A scenario does not hold, host and image differ, or a tool is missing.

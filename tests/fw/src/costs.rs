@@ -4,7 +4,7 @@
 //! |---|---|---|
 //! | `sizes.txt` | flash and static RAM by section, panics, allocation, float text | ELF files |
 //! | `run.txt` | stack, instructions of a lookup and of a tick | QEMU: paint, timer by `-icount` |
-//! | `board.txt` | stack of the product's images: `cargo fw board` | painted memory on the emulated board |
+//! | `board.txt` | stack of the product's images: `cargo fw board` | emulated board: paint |
 //! | `c-api.txt` | the same of the C interface: `cargo fw c-api` | C programs, linked and run |
 //!
 //! A figure past its goal fails, but for the misses that the file already states: those are told at

@@ -60,7 +60,7 @@ pub struct Done {
 /// | S | status of the captures' timer | whether a capture was lost; whether there is one |
 /// | C | the capture | |
 /// | A | the converter's result | the measurement of the pilot |
-/// | D | items left of the receiver's DMA, and above 16 bits the byte at the reader's place | the loop |
+/// | D | items left of the receiver's DMA; above 16 bits the byte that is read next | the loop |
 /// | U | status of the serial line | whether it takes a byte |
 /// | B | the byte sent | |
 #[derive(Debug, Default)]
