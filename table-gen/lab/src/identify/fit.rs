@@ -64,7 +64,8 @@ impl Data {
     /// round slowly, and neighbours have nearly the same one though their readings differ. The mean
     /// of some errors is bounded by half a step as one reading's is; how much less it is nobody
     /// knows, so a mean counts as one reading does ([`Noise`](super::intervals::Noise) takes at
-    /// least the variance of one rounding). Samples a second apart that differ stand for themselves.
+    /// least the variance of one rounding). Samples a second apart that differ stand for
+    /// themselves.
     pub fn misfits(&self, values: &Values) -> Vec<f64> {
         let residuals = self.residuals(values);
         let mut out: Vec<f64> = Vec::with_capacity(residuals.len());
