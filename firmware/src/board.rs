@@ -13,7 +13,7 @@ use crate::dispatch::Dispatch;
 use crate::dispatch::car::CarSense;
 use crate::fault::ResetCause;
 use crate::frequency::FrequencySource;
-use crate::frequency::zero_crossing::Captures;
+use crate::frequency::captures::Captures;
 use crate::telemetry::{FRAME_MAX, Frame, TableId, encode};
 
 /// What the loop asks of a board.

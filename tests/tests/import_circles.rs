@@ -209,22 +209,6 @@ fn reached<'g>(
     reached
 }
 
-/// Files of the firmware that need each other still: a mended circle, too, changes this list.
-const KNOWN: [&str; 12] = [
-    "firmware/src: board -> frequency::zero_crossing",
-    "firmware/src: frequency::zero_crossing -> board",
-    "firmware/src: observer -> observer::loss",
-    "firmware/src: observer::loss -> observer",
-    "firmware/src: table -> table::domain, table::header, table::law, table::response_part",
-    "firmware/src: table::dense -> table, table::law",
-    "firmware/src: table::domain -> table, table::tree",
-    "firmware/src: table::header -> table::hypotheses",
-    "firmware/src: table::hypotheses -> table",
-    "firmware/src: table::law -> table, table::dense, table::domain, table::header, table::tree",
-    "firmware/src: table::response_part -> table",
-    "firmware/src: table::tree -> table, table::law",
-];
-
 #[test]
 fn no_file_reaches_itself() {
     let mut circles = Vec::new();
@@ -247,7 +231,7 @@ fn no_file_reaches_itself() {
             ));
         }
     }
-    assert_eq!(circles, KNOWN, "{}", circles.join("\n"));
+    assert!(circles.is_empty(), "{}", circles.join("\n"));
 }
 
 #[test]

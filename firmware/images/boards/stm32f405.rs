@@ -32,7 +32,7 @@ use firmware::charger::reference;
 use firmware::dispatch::car::{CarSense, CarState};
 use firmware::dispatch::pilot::PILOT_HZ;
 use firmware::fault::{Faults, ResetCause};
-use firmware::frequency::zero_crossing::Captures;
+use firmware::frequency::captures::Captures;
 use firmware::retained::{self, Ending};
 use stm32f4xx_hal::gpio::{Output, PA0, PA1, PA4, PA5, PA6, PA7, PA8, PB0};
 use stm32f4xx_hal::pac::{self, ADC_COMMON, ADC1, SPI1, TIM1, TIM2, TIM5};

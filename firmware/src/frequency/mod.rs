@@ -5,6 +5,7 @@
 //! wrong with a reading is a [`FrequencyError`].
 
 pub mod ade7953;
+pub mod captures;
 pub mod filter;
 pub mod gate;
 pub mod zero_crossing;

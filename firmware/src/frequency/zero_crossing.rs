@@ -27,6 +27,7 @@
 
 use core::num::NonZeroU16;
 
+use super::captures::Captures;
 use super::gate::GateLimits;
 use super::{FrequencyError, FrequencySource, Nominal, Reading};
 use crate::board::Hardware;
@@ -50,22 +51,6 @@ pub const RATE_HZ_PER_S: u32 = GateLimits::DEFAULT.rate_uhz_per_s / MICRO as u32
 const _: () = assert!(RATE_HZ_PER_S > 0);
 
 const _: () = assert!(CYCLES_MAX as u64 * TIMER_HZ_MAX as u64 / 45 < u32::MAX as u64);
-
-/// Hardware that keeps the timer's count at a zero crossing until it is read.
-pub trait Captures {
-    /// Rate of the timer \[Hz\].
-    const TIMER_HZ: u32;
-    /// Tolerance of the timer's clock \[ppm\].
-    const CLOCK_PPM: u16;
-    /// Most by which a crossing is captured early or late, comparator and noise \[ns\].
-    const JITTER_NS: u32;
-
-    /// The count at the last crossing, if there was one since the last call.
-    fn take(&mut self) -> Option<u32>;
-
-    /// Whether a crossing was captured and overwritten before it was taken, since the last call.
-    fn lost(&mut self) -> bool;
-}
 
 /// A window fed by capture hardware.
 #[derive(Debug)]

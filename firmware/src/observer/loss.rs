@@ -9,7 +9,7 @@
 //! the estimate is exact up to the error bound of [`LossEstimator::error_kw`] once the window lies
 //! behind the onset: W h = 1 s.
 
-use super::{ObserverConfig, floor};
+use super::config::{ObserverConfig, floor};
 use crate::units::MICRO;
 
 /// Ticks of the window.

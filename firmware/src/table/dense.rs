@@ -9,9 +9,9 @@
 //! The last byte is padded with zeros. An entry is 0 outside the law's domain, else the level plus
 //! one.
 
-use super::BlockError;
 use super::bytes::u16_at;
-use super::law::Encoding;
+use super::encoding::Encoding;
+use super::error::BlockError;
 use crate::grid::{Cell, Grid};
 use crate::units::STATES;
 

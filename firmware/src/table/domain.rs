@@ -24,8 +24,8 @@
 //! | 58 + k | if look-ahead k says so |
 //! | 63 | if it lies in every half-space of the hull |
 
-use super::BlockError;
 use super::affine::{AFFINE_LEN, AffineFunction};
+use super::error::BlockError;
 use super::look_ahead::{LOOK_AHEAD_LEN, LookAhead, covers};
 use super::tree::NodesView;
 use super::tree_node::LEAF_VALUES;

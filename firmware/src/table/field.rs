@@ -19,6 +19,8 @@ pub const VERSION: Field = 6..8;
 pub const LENGTH: Field = 8..12;
 /// First half of the spec's SHA-256.
 pub const SPEC_HASH: Field = 12..28;
+/// Its bytes.
+pub const SPEC_HASH_LEN: usize = SPEC_HASH.end - SPEC_HASH.start;
 /// Lower edge of the first cell, f g l p, i32 \[µHz, kW\].
 pub const LOWER_EDGE: Field = 28..44;
 /// Cell width, f g l p, u32 \[µHz, kW\].

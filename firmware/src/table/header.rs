@@ -2,45 +2,17 @@
 //!
 //! Where each field stands is in [`super::field`]; reader and writer are in `header_bytes`.
 
+use super::field::SPEC_HASH_LEN;
 use super::hypotheses::Hypotheses;
+use super::law_name::LAWS;
 use crate::droop::Droop;
 use crate::grid::Grid;
 use crate::units::{Band, Participation};
 
-/// Bytes of the spec hash.
-pub const SPEC_HASH_LEN: usize = 16;
-/// Laws that a table may hold.
-pub const LAWS: usize = 3;
 /// Most input levels a table may have.
 pub const LEVELS_MAX: u8 = 32;
 /// Longest tick \[ms\]: half of the shortest time after which a board's watchdog bites.
 pub const TICK_MS_MAX: u16 = 200;
-
-/// A law of the table, in the order of the directory.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
-#[repr(u8)]
-pub enum Law {
-    /// Reaches I1.
-    C1 = 0,
-    /// Reaches I2.
-    C2 = 1,
-    /// Stays in I2.
-    Hold = 2,
-}
-
-impl Law {
-    /// All laws in the order of the directory.
-    pub const ALL: [Self; LAWS] = [Self::C1, Self::C2, Self::Hold];
-
-    /// The law's name, as people and JSON read it.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::C1 => "C1",
-            Self::C2 => "C2",
-            Self::Hold => "Hold",
-        }
-    }
-}
 
 /// Directory entry of a law: kinds and lengths of its two parts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

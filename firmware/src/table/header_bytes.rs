@@ -2,14 +2,13 @@
 //!
 //! Where each field stands is said once, in [`field`].
 
-use super::TableError;
 use super::bytes::{HeaderWords, WORD, array_at, u16_at, u32_at};
-use super::checksum;
-use super::field::{self, Field, entry};
-use super::header::{
-    Header, LAWS, LEVELS_MAX, LawEntry, PlantParameters, SPEC_HASH_LEN, TICK_MS_MAX, Working,
-};
+use super::checksum::checksum;
+use super::error::TableError;
+use super::field::{self, Field, SPEC_HASH_LEN, entry};
+use super::header::{Header, LEVELS_MAX, LawEntry, PlantParameters, TICK_MS_MAX, Working};
 use super::hypotheses::Hypotheses;
+use super::law_name::LAWS;
 use super::response_part::RESPONSE_LEN;
 use crate::droop::Droop;
 use crate::grid::Grid;

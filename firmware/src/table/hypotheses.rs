@@ -3,8 +3,8 @@
 //! A charger compares it with what it is ([`crate::charger`]); the verifier holds it against the
 //! spec. Intervals are `[least, most]`.
 
-use super::TableError;
 use super::bytes::HeaderWords;
+use super::error::TableError;
 use super::field::{self, Field};
 use crate::units::{MICRO, STATES};
 

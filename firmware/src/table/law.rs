@@ -1,29 +1,14 @@
 //! One law of the table: a domain part that answers "is this cell covered", an inputs part that
 //! answers "which level".
 
-use super::BlockError;
 use super::dense::DenseView;
 use super::domain::DomainView;
+use super::encoding::Encoding;
+use super::error::BlockError;
 use super::header::{LawEntry, Working};
 use super::tree::TreeView;
 use crate::grid::{Cell, Grid};
 use crate::units::STATES;
-
-/// What every encoding of a law's inputs can do.
-pub trait Encoding {
-    /// Input level at a cell, or `None` where the encoding has no entry. Total: any cell is
-    /// allowed.
-    fn level(&self, cell: Cell) -> Option<u8>;
-
-    /// Entries or nodes that this lookup visits.
-    fn visits(&self, cell: Cell) -> u16;
-
-    /// The most that any lookup visits.
-    fn worst_visits(&self) -> u16;
-
-    /// Entries (dense) or leaves (tree) stored.
-    fn entries(&self) -> u32;
-}
 
 /// Encodings of the inputs part, by their number in the directory.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -10,151 +10,51 @@
 
 mod affine;
 mod bytes;
+mod checksum;
 mod dense;
 mod domain;
+mod encoding;
+mod error;
 pub mod field;
 mod header;
 mod header_bytes;
 mod hypotheses;
 mod law;
+mod law_name;
 mod look_ahead;
 mod response_part;
 mod tree;
 mod tree_node;
 
 pub use affine::{AFFINE_FRACTION_BITS, AFFINE_LEN, AffineFunction};
+pub use checksum::checksum;
 pub use dense::{DENSE_HEADER_LEN, DenseView, bits_per_entry};
 pub use domain::{
     DomainKind, HALF_SPACES_MAX, LEAF_HALF_SPACE, LEAF_HULL, LEAF_INSIDE, LEAF_LOOK_AHEAD,
     LEAF_OUTSIDE, LOOK_AHEADS_MAX,
 };
-pub use header::{
-    Header, LAWS, LEVELS_MAX, Law, LawEntry, PlantParameters, SPEC_HASH_LEN, TICK_MS_MAX, Working,
-};
+pub use encoding::Encoding;
+pub use error::{BlockError, TableError};
+pub use field::SPEC_HASH_LEN;
+pub use header::{Header, LEVELS_MAX, LawEntry, PlantParameters, TICK_MS_MAX, Working};
 pub use header_bytes::{
     BYTE_ORDER_MARK, CRC_LEN, DIRECTORY_ENTRY_LEN, FORMAT_VERSION, HEADER_LEN, MAGIC, WriteError,
     seal, write_header,
 };
 pub use hypotheses::{Direction, Hypotheses, LossProfile};
-pub use law::{Encoding, InputsKind, LawView};
+pub use law::{InputsKind, LawView};
+pub use law_name::{LAWS, Law};
 pub use look_ahead::{LOOK_AHEAD_LEN, LOOK_AHEAD_SHIFT_MAX, LOOK_AHEAD_STEPS_MAX, LookAhead};
 pub use response_part::{RESPONSE_LEN, write_response};
 pub use tree::{AFFINE_PIECES_MAX, LEAF_AFFINE, TREE_DEPTH_MAX, TreeView};
 pub use tree_node::{Children, LEAF_VALUES, NODE_LEN_MAX, Node, SKIP_MAX};
 
-use crate::grid::{Cell, GridError};
+use crate::grid::Cell;
 use crate::prediction::{PredictionView, prediction_len};
 use crate::response::ResponseLaw;
 use bytes::HeaderWords;
 use header_bytes::read_working;
 use response_part::read_response;
-
-/// CRC-32 as in Ethernet and zip (polynomial 0x04C11DB7 reflected).
-const CRC: crc::Crc<u32, crc::NoTable> = crc::Crc::<u32, crc::NoTable>::new(&crc::CRC_32_ISO_HDLC);
-
-/// CRC-32 of a stretch of bytes, as the table's trailer stores it.
-pub fn checksum(bytes: &[u8]) -> u32 {
-    CRC.checksum(bytes)
-}
-
-/// Why an image was rejected.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum TableError {
-    /// Fewer bytes than a header and a CRC.
-    TooShort {
-        /// Bytes found.
-        found: u32,
-        /// Bytes that every table has.
-        needed: u32,
-    },
-    /// The first four bytes are not `MAGIC`.
-    BadMagic {
-        /// Bytes found.
-        found: [u8; 4],
-    },
-    /// The byte-order mark is swapped: written on a big-endian machine.
-    WrongEndianness,
-    /// Neither the byte-order mark nor its swap.
-    BadByteOrderMark {
-        /// Value found.
-        found: u16,
-    },
-    /// Another version of the format.
-    UnsupportedVersion {
-        /// Version found.
-        found: u16,
-        /// The version that this reader reads.
-        supported: u16,
-    },
-    /// The header's length is not the image's.
-    WrongLength {
-        /// Bytes in the image.
-        found: u32,
-        /// Length that the header states.
-        stated: u32,
-    },
-    /// The CRC does not match.
-    BadCrc {
-        /// CRC of the bytes.
-        computed: u32,
-        /// CRC in the trailer.
-        stored: u32,
-    },
-    /// The table was made from another spec.
-    ForeignSpec {
-        /// Hash in the header.
-        found: [u8; SPEC_HASH_LEN],
-        /// Hash expected.
-        expected: [u8; SPEC_HASH_LEN],
-    },
-    /// The header's grid is impossible.
-    BadGrid(GridError),
-    /// A header field is out of its range.
-    BadField {
-        /// Offset of the field in the image, as in [`field`].
-        offset: u16,
-    },
-    /// The block of a law is malformed.
-    BadBlock {
-        /// The law.
-        law: Law,
-        /// Why.
-        reason: BlockError,
-    },
-}
-
-impl TableError {
-    /// This field of the header is out of its range.
-    pub(crate) const fn bad_field(field: &field::Field) -> Self {
-        Self::BadField {
-            offset: field.start as u16,
-        }
-    }
-}
-
-/// Why the block of a law is malformed.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum BlockError {
-    /// The block reaches past the image, or blocks overlap or leave gaps.
-    OutOfImage,
-    /// An encoding that this reader does not know.
-    UnknownEncoding {
-        /// Kind found.
-        found: u8,
-    },
-    /// The block's own header contradicts its length or the grid.
-    BadShape,
-    /// An entry names an input level that does not exist.
-    BadLevel,
-    /// A node of a tree is malformed, or a subtree does not end where its parent says.
-    BadNode,
-    /// A law or half-space could overflow 32 bits on the header's grid.
-    Overflow,
-    /// The inputs answer for every cell, so the law needs a domain part and has none.
-    NoDomain,
-    /// A lookup could take more visits than the directory states, or more than the reader accepts.
-    TooManyVisits,
-}
 
 /// A table that was checked; lookups are total.
 #[derive(Debug, Clone)]

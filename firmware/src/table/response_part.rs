@@ -2,8 +2,8 @@
 //!
 //! Eight words of four bytes. The reader accepts what [`crate::response`] is total for.
 
-use super::TableError;
 use super::bytes::WORD;
+use super::error::TableError;
 use super::field::{Field, response};
 use crate::response::{DROOP_GAIN_MAX, ResponseLaw, WINDOW_TICKS_MAX};
 use crate::units::MICRO;

@@ -12,9 +12,9 @@
 //! The tree is checked once, from front to back with a stack of fixed size; after that a lookup
 //! visits at most [`TreeView::depth`] nodes and always ends at a leaf.
 
-use super::BlockError;
 use super::affine::{AFFINE_LEN, AffineFunction};
-use super::law::Encoding;
+use super::encoding::Encoding;
+use super::error::BlockError;
 use super::tree_node::{
     BYTE_ESCAPE, Children, DELTA_ESCAPE, DELTA_SHIFT, FLAG, LEAF_VALUES, Node, SHORT_SKIP,
 };
