@@ -26,6 +26,8 @@
 //! nothing that counts, and looks free: it is erased when the flash is opened.
 
 use core::ops::Range;
+use core::pin::Pin;
+use core::task::{Context, Poll};
 
 use embedded_storage::nor_flash::{MultiwriteNorFlash, NorFlashError, NorFlashErrorKind};
 use embedded_storage_async::nor_flash as served;
@@ -233,6 +235,31 @@ impl<F: MultiwriteNorFlash> Pages<F> {
     }
 }
 
+impl<F: MultiwriteNorFlash> Pages<F> {
+    fn erase_range(&mut self, from: u32, to: u32) -> Result<(), FlashError> {
+        let seen = Self::SEEN as u32;
+        if !from.is_multiple_of(seen) || !to.is_multiple_of(seen) || to / seen > self.count {
+            return Err(FlashError::OutOfBounds);
+        }
+        for page in from / seen..to / seen {
+            self.erase_page(page)?;
+        }
+        Ok(())
+    }
+}
+
+/// What the flash said: it is there already. Polled once more it waits for ever, where the
+/// language's own futures panic.
+struct Done(Option<Result<(), FlashError>>);
+
+impl Future for Done {
+    type Output = Result<(), FlashError>;
+
+    fn poll(mut self: Pin<&mut Self>, _: &mut Context<'_>) -> Poll<Self::Output> {
+        self.0.take().map_or(Poll::Pending, Poll::Ready)
+    }
+}
+
 impl<F> served::ErrorType for Pages<F> {
     type Error = FlashError;
 }
@@ -240,9 +267,15 @@ impl<F> served::ErrorType for Pages<F> {
 impl<F: MultiwriteNorFlash> served::ReadNorFlash for Pages<F> {
     const READ_SIZE: usize = F::READ_SIZE;
 
-    async fn read(&mut self, offset: u32, bytes: &mut [u8]) -> Result<(), FlashError> {
-        let address = self.address(offset, bytes.len())?;
-        self.read_at(address, bytes)
+    fn read(
+        &mut self,
+        offset: u32,
+        bytes: &mut [u8],
+    ) -> impl Future<Output = Result<(), FlashError>> {
+        let address = self.address(offset, bytes.len());
+        Done(Some(
+            address.and_then(|address| self.read_at(address, bytes)),
+        ))
     }
 
     fn capacity(&self) -> usize {
@@ -254,19 +287,14 @@ impl<F: MultiwriteNorFlash> served::NorFlash for Pages<F> {
     const WRITE_SIZE: usize = F::WRITE_SIZE;
     const ERASE_SIZE: usize = Self::SEEN;
 
-    async fn erase(&mut self, from: u32, to: u32) -> Result<(), FlashError> {
-        let seen = Self::SEEN as u32;
-        if !from.is_multiple_of(seen) || !to.is_multiple_of(seen) || to / seen > self.count {
-            return Err(FlashError::OutOfBounds);
-        }
-        for page in from / seen..to / seen {
-            self.erase_page(page)?;
-        }
-        Ok(())
+    fn erase(&mut self, from: u32, to: u32) -> impl Future<Output = Result<(), FlashError>> {
+        Done(Some(self.erase_range(from, to)))
     }
 
-    async fn write(&mut self, offset: u32, bytes: &[u8]) -> Result<(), FlashError> {
-        let address = self.address(offset, bytes.len())?;
-        self.write_at(address, bytes)
+    fn write(&mut self, offset: u32, bytes: &[u8]) -> impl Future<Output = Result<(), FlashError>> {
+        let address = self.address(offset, bytes.len());
+        Done(Some(
+            address.and_then(|address| self.write_at(address, bytes)),
+        ))
     }
 }
