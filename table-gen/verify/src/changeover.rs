@@ -10,6 +10,9 @@
 //!   nothing of it, one with s >= t + b knows nothing of u⁻. Between, no other change is in the
 //!   window, for b - a <= τ. So in [t + a, t + b) the fleet gives a mean of u⁻ and u, and the net
 //!   power lies in the hull of the two levels' intervals. From t + b on it is under u alone.
+//!   (The intervals bound the whole fleet under one command. They bound a mixture if no charger
+//!   gives less under a larger command than under a smaller one: the mixture then lies between what
+//!   the fleet would give under u⁻ alone and under u alone. This is assumed of the chargers.)
 //! - The next decision comes at t + τ >= t + b. What acts from there until its command can act is
 //!   u, for all chargers: what the device predicts with the least delay a is as exact as with a
 //!   fixed delay of a. [`super::delayed_loop`] derives that error, and holds for δ = a.
