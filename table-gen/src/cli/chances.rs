@@ -21,7 +21,8 @@ pub(super) struct Chances {
     /// spec's
     #[arg(long, value_name = "F,G,L,P", allow_hyphen_values = true)]
     pub(super) measurement_error: Option<PerState>,
-    /// Time from a command to its power [s]; default: the spec's. With --runs also a band LOW,HIGH
+    /// Time from a command to its power [s]; default: the spec's, of a range the most. With --runs
+    /// also a band LOW,HIGH; default: the spec's range
     #[arg(long, value_name = "S", allow_hyphen_values = true)]
     pub(super) delay_s: Option<Band>,
 }
