@@ -95,7 +95,7 @@ pub struct Header {
     pub plant: PlantParameters,
     /// What the proof assumed.
     pub hypotheses: Hypotheses,
-    /// The directory, indexed by [`Law`].
+    /// The directory, indexed by [`Law`](super::Law).
     pub laws: [Option<LawEntry>; LAWS],
 }
 

@@ -53,7 +53,7 @@ impl Data {
     }
 
     /// The same with readings whose errors are nearly one error taken as one: the mean of their
-    /// residuals. Those are the readings of a run of equal ones, and those within [`ONE_ERROR_S`].
+    /// residuals. Those are the readings of a run of equal ones, and those within a second.
     /// That is what fits are judged by.
     ///
     /// A reading is f rounded, and so off by at most half a step. Where f moves by less than a step
