@@ -1,8 +1,9 @@
 //! What drives the plant, in the device's micro-units: net power by level, and the estimate's
 //! error.
 
+use firmware::units::{AXIS_G, AXIS_L, AXIS_P};
 use model::interval::Interval;
-use model::plant::STATES;
+use model::plant::{Plant, STATES};
 use model::spec::Spec;
 
 /// Micro-units in a unit.
@@ -21,7 +22,50 @@ pub fn net_power(spec: &Spec, level: usize) -> Interval {
     let high = (honest * (Interval::ONE + error) + hostile).high.min(1.0);
     let [loss_low, loss_high] = spec.uncertainty.loss_gw;
     let loss = Interval::hull(loss_low, loss_high) * Interval::point(MICRO);
-    fleet * Interval::hull(low, high) - loss
+    let nominal = fleet * Interval::hull(low, high) - loss;
+    match spec
+        .counted_frequency_hz()
+        .filter(|_| spec.has_plant_band())
+    {
+        Some(frequency_hz) => nominal + off_nominal(spec, nominal, frequency_hz),
+        None => nominal,
+    }
+}
+
+/// What H, 1/R_eq and D that are not the plant's add to a net power \[µGW\], for f in a range
+/// \[Hz\].
+///
+/// Games speak of f and of the chain's states times K_0/K: those obey the equations of the plant's
+/// own K_0, since the chain is linear in its gain, and they are what the device computes. What is
+/// left acts on f' alone, as more or less net power does:
+///
+/// ```text
+/// 2 H_0 f' = p + v - D_0 f + e,   e = (H_0/H) N - (p + v - D_0 f),   N = (K/K_0) p + v - D f
+/// ```
+///
+/// where p lies between the least and the most that a chain which starts within the initial box
+/// makes of such f. The verifier has its own derivation, and proves the range of f.
+fn off_nominal(spec: &Spec, v: Interval, [low, high]: [f64; 2]) -> Interval {
+    let plant = Plant::new(spec);
+    let micro = |value: f64| Interval::point(value) * Interval::point(MICRO);
+    let f = micro(low).join(micro(high));
+    let initial = |axis: usize| {
+        let initial = &spec.uncertainty.initial;
+        micro(initial.lower[axis]).join(micro(initial.upper[axis]))
+    };
+    let asked = Interval::point(plant.governor_gain) * f;
+    let g = asked.join(initial(AXIS_G));
+    let lead = Interval::point(plant.lead_time) / Interval::point(plant.governor_time);
+    let l = (lead * asked + (Interval::ONE - lead) * g).join(initial(AXIS_L));
+    let p = l.join(initial(AXIS_P));
+    let ends = |[low, high]: [f64; 2]| Interval::hull(low, high);
+    let one = Interval::ONE;
+    let gain = ends(spec.governor_gain_band()) / Interval::point(plant.governor_gain) - one;
+    let lighter = Interval::point(plant.inertia) / ends(spec.inertia_band()) - one;
+    let nominal_damping = Interval::point(plant.damping);
+    let damping = ends(spec.damping_band()) - nominal_damping;
+    let off = gain * p - damping * f;
+    off + lighter * (p + v - nominal_damping * f + off)
 }
 
 /// Bound of the estimate's error \[micro-units\], rounded up.

@@ -11,6 +11,7 @@ use super::changeover::Changeover;
 use super::drive::Drive;
 use super::estimate_error::EstimateError;
 use super::held_input::HeldInput;
+use super::plant_band::Premise;
 use model::flow::{Matrix, Vector, absolute_integral_between};
 use model::interval::Interval;
 use model::plant::{Plant, STATES};
@@ -44,6 +45,8 @@ pub(crate) struct Model {
     pub(crate) period_ticks: u32,
     /// How a period begins after a change of the command, where the delay is a range.
     pub(crate) changeover: Option<Changeover>,
+    /// What the drives count of a plant in bands, and for which f.
+    pub(crate) plant_band: Option<Premise>,
     /// What the device knows when it decides.
     pub(crate) known: EstimateError,
 }
@@ -54,14 +57,22 @@ impl Model {
     pub(super) fn without_delay(table: &TableView<'_>, spec: &Spec) -> Self {
         let header = table.header();
         let (a, b) = Plant::new(spec).matrices();
+        let initial = &spec.uncertainty.initial;
+        let initial: [Interval; STATES] = std::array::from_fn(|d| {
+            let (low, high) = (micro(initial.lower[d]), micro(initial.upper[d]));
+            low.join(high)
+        });
+        let plant_band = Premise::of(spec, &initial);
         let drives: Vec<Drive> = commands(table)
-            .map(|ppm| Drive::of(net_power(spec, ppm)))
+            .map(|ppm| {
+                let v = net_power(spec, ppm);
+                Drive::of(plant_band.as_ref().map_or(v, |band| band.widened(v)))
+            })
             .collect();
         let tick_s = f64::from(header.tick_ms) / 1000.0;
         let period_ticks = u32::from(header.period_ticks);
         // Milliseconds first: the period is then one correctly rounded quotient.
         let period_s = f64::from(u32::from(header.tick_ms) * period_ticks) / 1000.0;
-        let initial = &spec.uncertainty.initial;
         let error = spec.uncertainty.measurement.map(up_micro);
         let period = HeldInput::new(&a, &b, period_s);
         let period_ms = u32::from(header.tick_ms) * period_ticks;
@@ -88,10 +99,8 @@ impl Model {
             known,
             drives,
             error,
-            initial: std::array::from_fn(|d| {
-                let (low, high) = (micro(initial.lower[d]), micro(initial.upper[d]));
-                low.join(high)
-            }),
+            initial,
+            plant_band,
             containment: spec.requirements.containment_hz.map(limit_micro),
             tick_s,
             tick: HeldInput::new(&a, &b, tick_s),

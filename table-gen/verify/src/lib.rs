@@ -71,6 +71,7 @@ mod image;
 mod no_control;
 mod outcome;
 mod path;
+mod plant_band;
 mod quiet;
 mod regions;
 pub mod response;
@@ -146,7 +147,7 @@ pub fn verify_assuming(
     let [low, high] = spec.requirements.inner_hz;
     let inner = closed_loop::micro(low).join(closed_loop::micro(high));
     let mut counts = Counts::default();
-    let (tally, reachable_cells, method, scope) = if let Some(limit) = &model.known.limit {
+    let (mut tally, reachable_cells, method, scope) = if let Some(limit) = &model.known.limit {
         let tally = Outcome {
             limit: Some(limit.clone()),
             ..Outcome::default()
@@ -191,6 +192,11 @@ pub fn verify_assuming(
         counts.event_to_inner_s = (tally.event_ticks > 0).then_some(first);
         (tally, explored.cells, Method::TightSets, scope)
     };
+    if let Some(premise) = &model.plant_band
+        && let Some(reason) = premise.reason(&tally)
+    {
+        tally.limit.get_or_insert(reason);
+    }
     counts.lookups = tally.lookups;
     counts.held_hz = tally.held.map(|range| [range.low / 1e6, range.high / 1e6]);
     counts.highest_hz = tally.highest.map(|f| f / 1e6);

@@ -1,7 +1,8 @@
 //! Adversaries for [`super::trajectory`]: fixed extremes, random bang-bang, and one that reads the
 //! state.
 
-use model::plant::STATES;
+use model::plant::{Plant, STATES};
+use model::spec::Spec;
 use rand::{Rng, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 
@@ -31,6 +32,25 @@ impl Random {
     /// -1 or 1.
     pub fn sign(&mut self) -> f64 {
         if self.number() >> 63 == 0 { -1.0 } else { 1.0 }
+    }
+}
+
+/// A number of a range, at an end of it half of the time.
+pub(super) fn within(random: &mut Random, [low, high]: [f64; 2]) -> f64 {
+    match random.number() % 4 {
+        0 => low,
+        1 => high,
+        _ => low + (high - low) * random.unit(),
+    }
+}
+
+/// A plant within a spec's bands.
+pub(super) fn drawn_plant(random: &mut Random, spec: &Spec) -> Plant {
+    Plant {
+        inertia: within(random, spec.inertia_band()),
+        governor_gain: within(random, spec.governor_gain_band()),
+        damping: within(random, spec.damping_band()),
+        ..Plant::new(spec)
     }
 }
 

@@ -25,7 +25,7 @@ use model::stepper::Stepper;
 use model::verdict::{ClaimName, RealPath};
 use rayon::prelude::*;
 
-use super::adversaries::Random;
+use super::adversaries::{Random, drawn_plant, within};
 use super::crowd::{Crowd, CrowdTimes, PARTS, fewest_members};
 use super::found::Falsification;
 
@@ -139,19 +139,10 @@ struct Draw {
 impl Draw {
     fn new(spec: &Spec, seed: u64) -> Self {
         let mut random = Random::new(seed);
-        let mut within = |[low, high]: [f64; 2]| match random.number() % 4 {
-            0 => low,
-            1 => high,
-            _ => low + (high - low) * random.unit(),
-        };
-        let plant = Plant {
-            inertia: within(spec.inertia_band()),
-            governor_gain: within(spec.governor_gain_band()),
-            damping: within(spec.damping_band()),
-            ..Plant::new(spec)
-        };
+        let plant = drawn_plant(&mut random, spec);
         let initial = &spec.uncertainty.initial;
-        let initial = std::array::from_fn(|d| within([initial.lower[d], initial.upper[d]]));
+        let initial =
+            std::array::from_fn(|d| within(&mut random, [initial.lower[d], initial.upper[d]]));
         let losses = losses(spec, &mut random);
         let (least, most) = (fewest(spec, MEMBERS.0), MEMBERS.1);
         Self {

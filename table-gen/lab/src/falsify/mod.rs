@@ -13,9 +13,10 @@
 //! | `fleet` | the search against a whole fleet, on a plant and losses that are drawn |
 //! | [`witness`] | for a verdict's failure: a real trajectory that shows it |
 //!
-//! Where a spec knows a fleet (own clocks, a band of the plant's parameters, or a response), the
-//! search is `fleet`'s. Else one charger decides for all, each follows after its own delay, and the
-//! search takes turns between three kinds of trajectory:
+//! Where a spec knows a fleet (own clocks, limited governors, or a response), the search is
+//! `fleet`'s. Else one charger decides for all, each follows after its own delay, every trajectory
+//! has a plant of its own where the spec has bands of it, and the search takes turns between three
+//! kinds of trajectory:
 //!
 //! | kind | chooses |
 //! |---|---|
@@ -36,7 +37,7 @@ pub mod witness;
 use firmware::table::{TableError, TableView};
 use model::spec::Spec;
 
-use adversaries::{BangBang, Constant, Random, Resonant};
+use adversaries::{BangBang, Constant, Random, Resonant, drawn_plant};
 pub use found::Falsification;
 use trajectory::{Adversary, Breach, Trajectories};
 use witness::real_path;
@@ -60,13 +61,7 @@ pub fn falsify(
     if knows_a_fleet(spec) || table.response().is_some() {
         return Ok(fleet::Fleets::new(&table, spec).search(steps, seed));
     }
-    let trajectories = Trajectories::new(&table, spec);
-    let length_s = spec.requirements.horizon_s.unwrap_or(TRAJECTORY_S);
-    let search = Search {
-        ticks: (length_s / trajectories.tick_s()).ceil() as u32,
-        trajectories,
-    };
-    Ok(search.run(steps, seed))
+    Ok(Search::new(&table, spec).run(steps, seed))
 }
 
 /// Draws so many fleets, plants, losses and states from a spec's bands and runs each once, or until
@@ -85,30 +80,22 @@ pub fn sample(
     if knows_a_fleet(spec) || table.response().is_some() {
         return Ok(fleet::Fleets::new(&table, spec).sample(runs, seed));
     }
-    let trajectories = Trajectories::new(&table, spec);
-    let length_s = spec.requirements.horizon_s.unwrap_or(TRAJECTORY_S);
-    let ticks = (length_s / trajectories.tick_s()).ceil() as u32;
-    let search = Search {
-        ticks,
-        trajectories,
-    };
+    let search = Search::new(&table, spec);
     // A trajectory that breaks nothing has this many steps.
-    Ok(search.run(runs * u64::from(ticks), seed))
+    Ok(search.run(runs * u64::from(search.ticks), seed))
 }
 
-/// Whether a spec says more of the fleet than one participation, or more of the plant than its
-/// linear equations.
+/// Whether a spec says more of the fleet than one participation, or more of the plant than linear
+/// equations.
 fn knows_a_fleet(spec: &Spec) -> bool {
-    let uncertainty = &spec.uncertainty;
-    uncertainty.own_clocks
-        || uncertainty.inertia_gw_s_per_hz.is_some()
-        || uncertainty.governor_gain_gw_per_hz.is_some()
-        || uncertainty.damping_gw_per_hz.is_some()
-        || !spec.plant.governor.is_absent()
+    spec.uncertainty.own_clocks || !spec.plant.governor.is_absent()
 }
 
 struct Search<'a> {
-    trajectories: Trajectories<'a>,
+    table: &'a TableView<'a>,
+    spec: &'a Spec,
+    /// On the spec's own plant.
+    nominal: Trajectories<'a>,
     ticks: u32,
 }
 
@@ -119,7 +106,28 @@ struct Outcome {
     breach: Option<Breach>,
 }
 
-impl Search<'_> {
+impl<'a> Search<'a> {
+    fn new(table: &'a TableView<'a>, spec: &'a Spec) -> Self {
+        let nominal = Trajectories::new(table, spec);
+        let length_s = spec.requirements.horizon_s.unwrap_or(TRAJECTORY_S);
+        Self {
+            table,
+            spec,
+            ticks: (length_s / nominal.tick_s()).ceil() as u32,
+            nominal,
+        }
+    }
+
+    /// On a plant that is drawn, if the spec has bands of it.
+    fn drawn(&self, draw: u64) -> Option<Trajectories<'a>> {
+        /// Sets these draws apart from the adversary's.
+        const PLANT: u64 = 0x706c_616e_7400_0000;
+        self.spec.has_plant_band().then(|| {
+            let plant = drawn_plant(&mut Random::new(draw ^ PLANT), self.spec);
+            Trajectories::on(self.table, self.spec, plant)
+        })
+    }
+
     fn run(&self, steps: u64, seed: u64) -> Falsification {
         let mut out = Falsification {
             steps: 0,
@@ -144,7 +152,9 @@ impl Search<'_> {
                     _ => Box::new(resonant.clone()),
                 }
             };
-            let outcome = self.outcome(make().as_mut());
+            let drawn = self.drawn(draw);
+            let trajectories = drawn.as_ref().unwrap_or(&self.nominal);
+            let outcome = self.outcome(trajectories, make().as_mut());
             out.steps += outcome.steps;
             out.trajectories += 1;
             out.smallest_margin_hz = out.smallest_margin_hz.min(outcome.margin_hz);
@@ -157,10 +167,9 @@ impl Search<'_> {
             }
             if let Some(breach) = outcome.breach {
                 let mut samples = Vec::new();
-                self.trajectories
-                    .run(make().as_mut(), self.ticks, &mut |sample| {
-                        samples.push(*sample);
-                    });
+                trajectories.run(make().as_mut(), self.ticks, &mut |sample| {
+                    samples.push(*sample);
+                });
                 let name = format!("kind {kind} of trajectory, draw {draw}");
                 out.violation = Some(real_path(breach, &samples, &name));
                 break;
@@ -169,10 +178,10 @@ impl Search<'_> {
         out
     }
 
-    fn outcome(&self, adversary: &mut dyn Adversary) -> Outcome {
+    fn outcome(&self, on: &Trajectories<'_>, adversary: &mut dyn Adversary) -> Outcome {
         let mut margin = f64::INFINITY;
-        let breach = self.trajectories.run(adversary, self.ticks, &mut |sample| {
-            margin = margin.min(self.trajectories.margin_hz(sample));
+        let breach = on.run(adversary, self.ticks, &mut |sample| {
+            margin = margin.min(on.margin_hz(sample));
         });
         Outcome {
             steps: breach.map_or(u64::from(self.ticks), |breach| u64::from(breach.tick) + 1),

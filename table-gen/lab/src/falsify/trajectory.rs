@@ -73,6 +73,9 @@ pub struct Trajectories<'a> {
     table: &'a TableView<'a>,
     spec: &'a Spec,
     plant: Plant,
+    /// What the device's observer computes of g, l and p, which knows the plant's own governor gain
+    /// alone, as a share of them.
+    observed: [f64; STATES],
     tick_s: f64,
     lateness: Lateness,
     /// The plant over 1..=PIECES pieces of each part of a tick.
@@ -83,7 +86,12 @@ pub struct Trajectories<'a> {
 impl<'a> Trajectories<'a> {
     /// Trajectories of a table on a spec's plant.
     pub fn new(table: &'a TableView<'a>, spec: &'a Spec) -> Self {
-        let plant = Plant::new(spec);
+        Self::on(table, spec, Plant::new(spec))
+    }
+
+    /// Trajectories of a table on another plant, of which the chargers know nothing.
+    pub fn on(table: &'a TableView<'a>, spec: &'a Spec, plant: Plant) -> Self {
+        let share = spec.plant.governor_gain_gw_per_hz / plant.governor_gain;
         let tick_s = f64::from(spec.sampling.watch_ms()) / 1000.0;
         let lateness = Lateness::of(spec, tick_s);
         let pieces = |part: &Part| {
@@ -96,6 +104,7 @@ impl<'a> Trajectories<'a> {
             table,
             spec,
             plant,
+            observed: [1.0, share, share, share],
             tick_s,
             pieces: lateness.parts.iter().map(pieces).collect(),
             lateness,
@@ -132,7 +141,8 @@ impl<'a> Trajectories<'a> {
         let (corner, moment) = adversary.event();
         let initial = &uncertainty.initial;
         let mut x: [f64; STATES] = std::array::from_fn(|d| {
-            initial.lower[d] + corner[d] * (initial.upper[d] - initial.lower[d])
+            let start = initial.lower[d] + corner[d] * (initial.upper[d] - initial.lower[d]);
+            start / self.observed[d]
         });
         let offset_s = moment * self.tick_s;
         see(&Sample {
@@ -154,7 +164,8 @@ impl<'a> Trajectories<'a> {
             let time_s = offset_s + f64::from(tick) * self.tick_s;
             let (share, error) = adversary.tick(&x);
             let measured = State(std::array::from_fn(|d| {
-                ((x[d] + error[d] * uncertainty.measurement[d]) * MICRO).floor() as i32
+                let known = self.observed[d] * x[d] + error[d] * uncertainty.measurement[d];
+                (known * MICRO).floor() as i32
             }));
             let decided_on = match self.table.prediction() {
                 Some(prediction) => prediction.predict(measured, &history),

@@ -140,28 +140,10 @@ fn check_games(spec: &Spec, origin: &Origin) -> Result<(), SpecError> {
             format!("{other}, or {is_response}"),
         ))
     };
-    let bands = [
-        (
-            "uncertainty.inertia_gw_s_per_hz",
-            uncertainty.inertia_gw_s_per_hz,
-        ),
-        (
-            "uncertainty.governor_gain_gw_per_hz",
-            uncertainty.governor_gain_gw_per_hz,
-        ),
-        (
-            "uncertainty.damping_gw_per_hz",
-            uncertainty.damping_gw_per_hz,
-        ),
-    ];
-    for (key, band) in bands {
-        if let Some(band) = band {
-            return refuse(key, format!("{band:?}"), "none");
-        }
-    }
-    if let Some(lost) = uncertainty.inertia_lost_s_per_hz {
-        let key = "uncertainty.inertia_lost_s_per_hz";
-        return refuse(key, lost.to_string(), "none");
+    if spec.has_plant_band() && spec.requirements.containment_hz.is_none() {
+        let key = "requirements.containment_hz";
+        let allowed = "a limit of f, since games count H, 1/R_eq and D in bands for f above it";
+        return Err(inconsistent(origin, key, "none".to_owned(), allowed));
     }
     if uncertainty.own_clocks {
         return refuse("uncertainty.own_clocks", "true".to_owned(), "false");

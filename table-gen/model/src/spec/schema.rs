@@ -119,6 +119,31 @@ impl Spec {
         self.uncertainty.damping_gw_per_hz.unwrap_or([nominal; 2])
     }
 
+    /// Whether H, 1/R_eq or D may be another than the plant's.
+    #[must_use]
+    pub fn has_plant_band(&self) -> bool {
+        [
+            self.inertia_band(),
+            self.governor_gain_band(),
+            self.damping_band(),
+        ]
+        .iter()
+        .any(|[low, high]| low < high)
+    }
+
+    /// The deviations \[Hz\] for which games count a plant that is known in bands: from a little
+    /// below containment to a little above the grid of cells. The verifier proves that f stays
+    /// inside. `None` without containment, which a spec with such a band has.
+    #[must_use]
+    pub fn counted_frequency_hz(&self) -> Option<[f64; 2]> {
+        /// Below containment \[Hz\].
+        const BELOW_HZ: f64 = 0.01;
+        /// Above the grid of cells \[Hz\]: f may pass its edge between samples.
+        const ABOVE_HZ: f64 = 0.05;
+        let containment = self.requirements.containment_hz?;
+        Some([containment - BELOW_HZ, self.grid.upper[0] + ABOVE_HZ])
+    }
+
     /// Least and most time from a command to what the grid sees of it \[s\].
     ///
     /// With W the most, a charger's power at t lies among what it was told in \[t - W, t - least\]:

@@ -4,6 +4,7 @@
 mod delay;
 mod delay_range;
 mod late_fleet;
+mod plant_band;
 mod tube;
 
 use rand::{Rng, SeedableRng};

@@ -207,9 +207,6 @@ fn response(more: &[&str]) -> Vec<String> {
 #[test]
 fn what_games_do_not_cover_is_refused_by_its_key_and_taken_for_a_response() {
     let only_responses = [
-        "uncertainty.inertia_gw_s_per_hz=[2.04, 5]",
-        "uncertainty.governor_gain_gw_per_hz=[-5, -4]",
-        "uncertainty.damping_gw_per_hz=[0.8, 1]",
         "uncertainty.own_clocks=true",
         "uncertainty.participation_absolute=0.01",
         "meter.kind=zero-crossing",
@@ -220,6 +217,17 @@ fn what_games_do_not_cover_is_refused_by_its_key_and_taken_for_a_response() {
         assert!(message.contains("which games do not cover"), "{message}");
         assert!(message.contains("preference.always_on"), "{message}");
         Spec::load("paper-bi", &response(&[option])).unwrap();
+    }
+    // Plants in bands, if f has a limit.
+    for option in [
+        "uncertainty.inertia_gw_s_per_hz=[3.9, 4.1]",
+        "uncertainty.inertia_lost_s_per_hz=0.05",
+        "uncertainty.governor_gain_gw_per_hz=[-5, -4.9]",
+        "uncertainty.damping_gw_per_hz=[0.9, 1]",
+    ] {
+        with(&[option]).unwrap();
+        let unlimited = [option, "requirements.containment_hz=none"];
+        refused(&unlimited, "requirements.containment_hz");
     }
     // A range of delays up to a period.
     with(&["uncertainty.actuation_delay_s=[0.1, 0.5]"]).unwrap();

@@ -1,0 +1,115 @@
+//! Laws by games on a plant whose H, 1/R_eq and D lie in bands: the nominal plant with something
+//! added to its net power.
+//!
+//! Write K for 1/R_eq, K₀, H₀, D₀ for the nominal values, κ = K/K₀, and N for the power that
+//! accelerates the grid. K is constant. The governor chain is linear in its gain, so q = (g, l, p)/κ
+//! obeys the nominal chain,
+//!
+//! ```text
+//! q_g' = (K₀ f - q_g)/T_G    q_l' = (q_g + T_1 q_g' - q_l)/T_2    q_p' = (q_l - q_p)/T_t
+//! 2H f' = N = κ q_p + v - D f
+//! ```
+//!
+//! and it is q, not (g, l, p), that the device's observer computes: it knows K₀ alone. So (f, q)
+//! obeys the nominal equations with the net power v + e,
+//!
+//! ```text
+//! e = (H₀/H) N - (q_p + v - D₀ f) = (κ - 1) q_p - (D - D₀) f + (H₀/H - 1) N
+//! ```
+//!
+//! and every set of this package, in which the net power moves within an interval as it likes,
+//! holds it once the interval is wider by the range of e; H and D may move too. The spec's
+//! `initial` and `measurement` are then about q.
+//!
+//! **The range of e** rests on f being in a range F since the event. q_g stays in any interval that
+//! holds K₀ F and q_g(0). q_l is drawn to `(T_1/T_G) K₀ f + (1 - T_1/T_G) q_g`, so it stays in any
+//! interval that holds this and q_l(0); q_p likewise follows q_l.
+//!
+//! **F is proven, not assumed.** Let t be the first time at which f leaves F. Up to t the interval
+//! of the net power is right, so the sets hold f, and [`Premise::reason`] has them end inside F by
+//! a margin. f is continuous: there is no such t.
+
+use firmware::units::{AXIS_F, AXIS_G, AXIS_L, AXIS_P};
+use model::interval::Interval;
+use model::plant::{Plant, STATES};
+use model::spec::Spec;
+
+use super::outcome::Outcome;
+
+/// By how much f must end inside the range \[µHz\].
+const INSIDE: f64 = 1.0;
+
+/// What a plant in bands adds to the net power, and the range of f for which it does.
+#[derive(Debug, Clone)]
+pub(crate) struct Premise {
+    /// The range of f \[µHz\].
+    f: Interval,
+    /// Of q_p \[kW\], for such f.
+    q: Interval,
+    /// κ - 1.
+    gain: Interval,
+    /// D - D₀ \[kW/µHz\].
+    damping: Interval,
+    /// D \[kW/µHz\].
+    whole_damping: Interval,
+    /// H₀/H - 1.
+    lighter: Interval,
+}
+
+impl Premise {
+    /// For a spec's bands and states at the event \[micro-units\], if it has any.
+    pub(crate) fn of(spec: &Spec, initial: &[Interval; STATES]) -> Option<Self> {
+        let bands = [
+            spec.inertia_band(),
+            spec.governor_gain_band(),
+            spec.damping_band(),
+        ];
+        if bands.iter().all(|[low, high]| low == high) {
+            return None;
+        }
+        let [inertia, governor_gain, damping] = bands.map(|[low, high]| Interval::hull(low, high));
+        let plant = Plant::new(spec);
+        let point = Interval::point;
+        // Without containment no range can be proven; the spec is refused before.
+        let f = match spec.counted_frequency_hz() {
+            Some([low, high]) => Interval::hull(low, high) * point(super::closed_loop::MICRO),
+            None => initial[AXIS_F],
+        };
+        let asked = point(plant.governor_gain) * f;
+        let g = asked.join(initial[AXIS_G]);
+        let share = point(plant.lead_time) / point(plant.governor_time);
+        let drawn = share * asked + (Interval::ONE - share) * g;
+        let l = drawn.join(initial[AXIS_L]);
+        Some(Self {
+            f,
+            q: l.join(initial[AXIS_P]),
+            gain: governor_gain / point(plant.governor_gain) - Interval::ONE,
+            damping: damping - point(plant.damping),
+            whole_damping: damping,
+            lighter: point(plant.inertia) / inertia - Interval::ONE,
+        })
+    }
+
+    /// v + e for a net power v \[kW\].
+    pub(crate) fn widened(&self, v: Interval) -> Interval {
+        let kappa = self.gain + Interval::ONE;
+        let accelerating = kappa * self.q + v - self.whole_damping * self.f;
+        v + self.gain * self.q - self.damping * self.f + self.lighter * accelerating
+    }
+
+    /// Why an exploration says nothing, if f may leave the range that it rests on.
+    pub(crate) fn reason(&self, tally: &Outcome) -> Option<String> {
+        let (low, high) = (tally.lowest?, tally.highest?);
+        let inside = low >= self.f.low + INSIDE && high <= self.f.high - INSIDE;
+        (!inside).then(|| {
+            format!(
+                "the bands of H, 1/R_eq and D are counted for f from {:.4} to {:.4} Hz, and f may \
+                 range from {:.4} to {:.4} Hz",
+                self.f.low / 1e6,
+                self.f.high / 1e6,
+                low / 1e6,
+                high / 1e6
+            )
+        })
+    }
+}
