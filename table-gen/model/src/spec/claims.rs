@@ -107,6 +107,26 @@ pub struct UncertaintySpec {
     /// Unit: GW/Hz. Allowed: 2 numbers, each from 0 to 1000, or none. Default: none.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub damping_gw_per_hz: Option<[f64; 2]>,
+    /// T_G anywhere in this, constant, unknown to the charger; absent: the plant's.
+    ///
+    /// Unit: s. Allowed: 2 numbers, each from 0.001 to 1000, or none. Default: none.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub governor_time_s: Option<[f64; 2]>,
+    /// T_t anywhere in this, constant, unknown to the charger; absent: the plant's.
+    ///
+    /// Unit: s. Allowed: 2 numbers, each from 0.001 to 1000, or none. Default: none.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub turbine_time_s: Option<[f64; 2]>,
+    /// T_1 anywhere in this, constant, unknown to the charger; absent: the plant's.
+    ///
+    /// Unit: s. Allowed: 2 numbers, each from 0 to 1000, or none. Default: none.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub lead_time_s: Option<[f64; 2]>,
+    /// T_2 anywhere in this, constant, unknown to the charger; absent: the plant's.
+    ///
+    /// Unit: s. Allowed: 2 numbers, each from 0.001 to 1000, or none. Default: none.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub lag_time_s: Option<[f64; 2]>,
     /// Whether each charger decides at moments of its own, on readings of its own.
     ///
     /// Unit: -. Allowed: true or false. Default: false.
@@ -147,6 +167,10 @@ impl Default for UncertaintySpec {
             inertia_lost_s_per_hz: None,
             governor_gain_gw_per_hz: None,
             damping_gw_per_hz: None,
+            governor_time_s: None,
+            turbine_time_s: None,
+            lead_time_s: None,
+            lag_time_s: None,
             own_clocks: false,
             initial: InitialBox::default(),
         }

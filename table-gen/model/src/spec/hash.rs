@@ -25,14 +25,15 @@ use std::fmt::Write as _;
 use sha2::{Digest, Sha256};
 
 use super::Spec;
-use super::keys::{CHANGES, FORMULA, KEYS, KeyValue, RECOVERY};
+use super::key_value::KeyValue;
+use super::keys::{CHANGES, FORMULA, KEYS, RECOVERY};
 
 /// Sections that no table depends on: the laboratory's cars, and what is drawn.
 const NOT_OF_THE_TABLE: [&str; 2] = ["charger", "chance"];
 /// Section of which a key that is absent gives no line: it came after the first tables.
 const GOVERNOR: &str = "plant.governor";
 /// Other keys that give no line where they are absent.
-const LATER: [&str; 7] = [
+const LATER: [&str; 11] = [
     FORMULA,
     RECOVERY,
     CHANGES,
@@ -40,6 +41,10 @@ const LATER: [&str; 7] = [
     "uncertainty.hostile_share",
     "uncertainty.level_discrepancy",
     INERTIA_LOST,
+    "uncertainty.governor_time_s",
+    "uncertainty.turbine_time_s",
+    "uncertainty.lead_time_s",
+    "uncertainty.lag_time_s",
 ];
 /// See [`LATER`].
 const INERTIA_LOST: &str = "uncertainty.inertia_lost_s_per_hz";

@@ -1,12 +1,11 @@
 //! The table of keys: the single source of units, ranges and descriptions.
 
-use std::fmt;
-
 use super::Spec;
 use super::allowed::{Allowed, Range};
 use super::claims::{Domain, LossProfile};
 use super::delay_range::DelayRange;
 use super::grid::{Alignment, MICRO_PER_UNIT};
+use super::key_value::KeyValue;
 use super::meter::MeterKind;
 use super::plant::Direction;
 use super::sampling::Successor;
@@ -40,42 +39,6 @@ pub fn reference() -> Vec<KeyDoc> {
             description: key.description,
         })
         .collect()
-}
-
-/// A value of the spec, borrowed from it.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) enum KeyValue<'a> {
-    /// A number, or an optional one that is present.
-    Number(f64),
-    /// An array of numbers.
-    Numbers(&'a [f64]),
-    /// A whole number.
-    Integer(u32),
-    /// A flag.
-    Flag(bool),
-    /// A name or a choice.
-    Text(&'a str),
-    /// An optional key that is absent.
-    Absent,
-}
-
-impl fmt::Display for KeyValue<'_> {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Number(x) => write!(f, "{x}"),
-            Self::Numbers(xs) => {
-                f.write_str("[")?;
-                for (i, x) in xs.iter().enumerate() {
-                    write!(f, "{}{x}", if i == 0 { "" } else { ", " })?;
-                }
-                f.write_str("]")
-            }
-            Self::Integer(n) => write!(f, "{n}"),
-            Self::Flag(flag) => write!(f, "{flag}"),
-            Self::Text(text) => write!(f, "{text:?}"),
-            Self::Absent => f.write_str("none"),
-        }
-    }
 }
 
 /// One row of the table: what is known of a key, and how to find its value in a [`Spec`].
@@ -359,6 +322,14 @@ pub(super) const KEYS: &[Key] = &[
         "band of 1/R_eq, unknown to the charger; absent: the plant's", |s| optionals(s.uncertainty.governor_gain_gw_per_hz.as_ref())),
     row("uncertainty.damping_gw_per_hz", "GW/Hz", Allowed::OptionalNumbers { len: 2, each: Range::closed(0.0, 1000.0) },
         "band of D, unknown to the charger; absent: the plant's", |s| optionals(s.uncertainty.damping_gw_per_hz.as_ref())),
+    row("uncertainty.governor_time_s", "s", Allowed::OptionalNumbers { len: 2, each: Range::closed(0.001, 1000.0) },
+        "band of T_G, unknown to the charger; absent: the plant's", |s| optionals(s.uncertainty.governor_time_s.as_ref())),
+    row("uncertainty.turbine_time_s", "s", Allowed::OptionalNumbers { len: 2, each: Range::closed(0.001, 1000.0) },
+        "band of T_t, unknown to the charger; absent: the plant's", |s| optionals(s.uncertainty.turbine_time_s.as_ref())),
+    row("uncertainty.lead_time_s", "s", Allowed::OptionalNumbers { len: 2, each: Range::closed(0.0, 1000.0) },
+        "band of T_1, unknown to the charger; absent: the plant's", |s| optionals(s.uncertainty.lead_time_s.as_ref())),
+    row("uncertainty.lag_time_s", "s", Allowed::OptionalNumbers { len: 2, each: Range::closed(0.001, 1000.0) },
+        "band of T_2, unknown to the charger; absent: the plant's", |s| optionals(s.uncertainty.lag_time_s.as_ref())),
     row("uncertainty.own_clocks", "-", Allowed::Flag,
         "whether each charger decides at moments of its own, on readings of its own", |s| KeyValue::Flag(s.uncertainty.own_clocks)),
     row("uncertainty.initial.lower", STATE_UNIT, STATE,

@@ -33,6 +33,7 @@ mod geometry;
 mod governor;
 mod grid;
 mod hash;
+mod key_value;
 mod keys;
 mod load;
 mod memory;

@@ -140,6 +140,17 @@ fn check_games(spec: &Spec, origin: &Origin) -> Result<(), SpecError> {
             format!("{other}, or {is_response}"),
         ))
     };
+    let bands = [
+        ("uncertainty.governor_time_s", uncertainty.governor_time_s),
+        ("uncertainty.turbine_time_s", uncertainty.turbine_time_s),
+        ("uncertainty.lead_time_s", uncertainty.lead_time_s),
+        ("uncertainty.lag_time_s", uncertainty.lag_time_s),
+    ];
+    for (key, band) in bands {
+        if let Some(band) = band {
+            return refuse(key, format!("{band:?}"), "none");
+        }
+    }
     if spec.has_plant_band() && spec.requirements.containment_hz.is_none() {
         let key = "requirements.containment_hz";
         let allowed = "a limit of f, since games count H, 1/R_eq and D in bands for f above it";

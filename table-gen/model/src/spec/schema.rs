@@ -144,6 +144,19 @@ impl Spec {
         Some([containment - BELOW_HZ, self.grid.upper[0] + ABOVE_HZ])
     }
 
+    /// Least and most T_G, T_t, T_1 and T_2 \[s\]: the bands of `[uncertainty]`, or the plant's.
+    #[must_use]
+    pub fn time_constant_bands(&self) -> [[f64; 2]; 4] {
+        let (plant, bands) = (&self.plant, &self.uncertainty);
+        [
+            (plant.governor_time_s, bands.governor_time_s),
+            (plant.turbine_time_s, bands.turbine_time_s),
+            (plant.lead_time_s, bands.lead_time_s),
+            (plant.lag_time_s, bands.lag_time_s),
+        ]
+        .map(|(nominal, band)| band.unwrap_or([nominal; 2]))
+    }
+
     /// Least and most time from a command to what the grid sees of it \[s\].
     ///
     /// With W the most, a charger's power at t lies among what it was told in \[t - W, t - least\]:

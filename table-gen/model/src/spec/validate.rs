@@ -5,7 +5,8 @@ use firmware::prediction::DELAY_TICKS_MAX;
 use crate::participation::Participation;
 
 use super::allowed::{self, Allowed};
-use super::keys::{KEYS, Key, KeyValue};
+use super::key_value::KeyValue;
+use super::keys::{KEYS, Key};
 use super::origin::{Origin, inconsistent};
 use super::sampling::{to_ms, to_whole_ms};
 use super::{
@@ -201,6 +202,18 @@ fn check_uncertainty(uncertainty: &UncertaintySpec, origin: &Origin) -> Result<(
             uncertainty.damping_gw_per_hz,
             "GW/Hz",
         ),
+        (
+            "uncertainty.governor_time_s",
+            uncertainty.governor_time_s,
+            "s",
+        ),
+        (
+            "uncertainty.turbine_time_s",
+            uncertainty.turbine_time_s,
+            "s",
+        ),
+        ("uncertainty.lead_time_s", uncertainty.lead_time_s, "s"),
+        ("uncertainty.lag_time_s", uncertainty.lag_time_s, "s"),
     ];
     for (key, interval, unit) in intervals {
         if let Some([low, high]) = interval

@@ -32,11 +32,12 @@ pub(super) fn covered(table: &TableView<'_>, spec: &Spec) -> Result<(), ClosedLo
             "uncertainty.own_clocks = false is",
         );
     }
-    for [low, high] in [
+    let bands = [
         spec.inertia_band(),
         spec.governor_gain_band(),
         spec.damping_band(),
-    ] {
+    ];
+    for [low, high] in bands.into_iter().chain(spec.time_constant_bands()) {
         if low < high {
             return unsupported("a plant known in bands", "one plant is");
         }

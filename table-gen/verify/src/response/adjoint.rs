@@ -27,6 +27,7 @@ use model::plant::STATES;
 use super::fleet_loop::{FleetLoop, LossProfile};
 use super::governor::Disturbance;
 use super::lines::{LINES, Line};
+use super::unknown::{self, OfStep, dot};
 
 /// Sixteen half units in the last place, relative.
 const EPS: f64 = 16.0 * f64::EPSILON;
@@ -38,10 +39,8 @@ pub(super) struct Step {
     pub(super) below: [Line; LINES],
     /// Lines above it.
     pub(super) above: [Line; LINES],
-    /// Bound of |f| in the step \[Hz\].
-    pub(super) f_most: f64,
-    /// Bound of `|p + P u - w - D f|` in the step \[GW\].
-    pub(super) net_most: f64,
+    /// What acts where the plant is not known.
+    pub(super) unknown: OfStep,
     /// How far f may leave the chord between the step's samples \[Hz\].
     pub(super) slack: f64,
     /// Bound of |f'| in the step \[Hz/s\].
@@ -251,12 +250,7 @@ impl Past<'_> {
             loss -= mean;
             rise_worst = rise_worst.min(ends - (absolute - mean.abs()));
             // Unknown constant parameters, as if they varied.
-            let spread = dot(&magnitude, &number.spread_f);
-            let unknown_f = number.inverse_inertia_radius * step.net_most
-                + number.inverse_inertia_most * number.damping_radius * step.f_most;
-            let unknown_gain = number.gain_radius * step.f_most;
-            let unknown = number.step_s
-                * (spread * unknown_f + dot(&magnitude, &number.spread_gain) * unknown_gain);
+            let unknown = unknown::most(number, &step.unknown, &magnitude);
             bound -= unknown;
             size += unknown;
             // What limits of the governors add: lines in the sample's f and g.
@@ -395,8 +389,4 @@ fn absolute_integral(start: f64, end: f64, curvature: f64, step_s: f64) -> f64 {
         0.5 * (a * a + b * b) / (a + b)
     };
     step_s * (chord + curvature) * (1.0 + EPS)
-}
-
-fn dot(a: &[f64; STATES], b: &[f64; STATES]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| a * b).sum()
 }

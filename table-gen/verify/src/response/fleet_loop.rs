@@ -8,6 +8,8 @@ use model::governor::Governor;
 use model::interval::Interval;
 use model::plant::{Plant, STATES};
 
+use super::time_bands::{TimeBands, UnknownTimes};
+
 /// The always-on law in real numbers, as the device's integers give it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct RealLaw {
@@ -47,7 +49,7 @@ pub enum LossProfile {
 /// The plant's parameters, each anywhere in its interval, constant and unknown to the chargers.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PlantBand {
-    /// Parameters that are known, and the fleet's power; the three below are not read from it.
+    /// Parameters that are known, and the fleet's power; those below are not read from it.
     pub known: Plant,
     /// H \[GW s/Hz\].
     pub inertia: Interval,
@@ -55,6 +57,8 @@ pub struct PlantBand {
     pub governor_gain: Interval,
     /// D \[GW/Hz\].
     pub damping: Interval,
+    /// T_G, T_t, T_1 and T_2.
+    pub times: TimeBands,
     /// What the governors cannot do.
     pub governor: Governor,
 }
@@ -145,8 +149,10 @@ pub struct FleetLoop {
     pub damping_mid: f64,
     /// Largest |K| \[GW/Hz\].
     pub gain_most: f64,
-    /// The plant's known parameters.
-    pub known: Plant,
+    /// T_G, T_t, T_1 and T_2, each anywhere in its band.
+    pub times: TimeBands,
+    /// What acts where they are not known; nothing where they are.
+    pub unknown_times: Option<UnknownTimes>,
     /// Largest rate of f before the event \[Hz/s\]: what the initial box allows without loss and
     /// fleet.
     pub rate_before: f64,
@@ -174,7 +180,7 @@ impl FleetLoop {
             governor_gain: plant.governor_gain.mid(),
             damping: plant.damping.mid(),
             inertia: 0.5 / inverse.mid(),
-            ..plant.known
+            ..plant.times.middle(plant.known)
         };
         let (a, b) = nominal.matrices();
         let nominal_inverse = b[0];
@@ -225,7 +231,8 @@ impl FleetLoop {
             damping_most,
             damping_mid: nominal.damping,
             gain_most: plant.governor_gain.magnitude(),
-            known: plant.known,
+            times: plant.times,
+            unknown_times: UnknownTimes::of(&plant.times, &nominal, &within),
             rate_before: (p + damping_most * f) * inverse_inertia_most * (1.0 + 1e-12),
             stages: Vec::new(),
         }
@@ -289,11 +296,10 @@ impl FleetLoop {
     /// and its gain times the largest input.
     pub fn chain_most(&self, f_most: f64) -> [f64; STATES] {
         let [_, g0, l0, p0] = self.assumed.initial;
-        let lead = self.known.lead_time / self.known.governor_time;
         let g = g0.max(self.gain_most * f_most);
         // The governors' input lies between g and what is asked of them.
         let asked = g.max(self.gain_most * f_most);
-        let l = l0.max(lead.abs() * asked + (1.0 - lead).abs() * g);
+        let l = l0.max(self.times.lead_most(asked, g));
         let p = p0.max(l);
         [f_most, g, l, p].map(|bound| bound * (1.0 + 1e-12))
     }

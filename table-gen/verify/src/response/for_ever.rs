@@ -13,6 +13,7 @@ use model::interval::Interval;
 use super::adjoint::{Choice, Past, Step, choices};
 use super::fleet_loop::FleetLoop;
 use super::governor;
+use super::unknown;
 use super::watched::Watched;
 use super::window::{F_MOST_HZ, Sample, Samples, Window, meet};
 
@@ -54,12 +55,10 @@ pub(super) fn from_rest(number: &FleetLoop, window: Window, memory: usize) -> Op
         }
     };
     let [f, g, l, p] = number.assumed.initial;
-    let watched = |range: Interval| {
-        if governor::is_limited(&number.governor) {
-            range
-        } else {
-            Interval::ZERO
-        }
+    let watched = |is: bool, range: Interval| if is { range } else { Interval::ZERO };
+    let within = |most: f64| Interval {
+        low: -most.next_up(),
+        high: most.next_up(),
     };
     let net = p + number.damping_most * f;
     let sample = Sample {
@@ -79,11 +78,15 @@ pub(super) fn from_rest(number: &FleetLoop, window: Window, memory: usize) -> Op
         slope_response: Interval::ZERO,
         slack: 0.0,
         rate: number.rate_before,
-        governor: watched(meet(state[1], governor::output(&number.governor))),
-        gap: watched(Interval {
-            low: -(number.gain_most * f + g).next_up(),
-            high: (number.gain_most * f + g).next_up(),
-        }),
+        governor: watched(
+            governor::is_limited(&number.governor),
+            meet(state[1], governor::output(&number.governor)),
+        ),
+        gap: watched(
+            unknown::watches_gap(number),
+            within(number.gain_most * f + g),
+        ),
+        lag: watched(number.unknown_times.is_some(), within(g + l)),
     };
     let mut bounds = reproduced(number, window, memory, sample, state)?;
     for _ in 0..ROUNDS {
@@ -242,6 +245,7 @@ fn join(a: Sample, b: Sample) -> Sample {
         rate: a.rate.max(b.rate),
         governor: a.governor.join(b.governor),
         gap: a.gap.join(b.gap),
+        lag: a.lag.join(b.lag),
     }
 }
 
@@ -268,11 +272,12 @@ fn grown(outer: Sample, found: Sample) -> Sample {
         rate: grow_most(outer.rate, found.rate),
         governor: grow(outer.governor, found.governor),
         gap: grow(outer.gap, found.gap),
+        lag: grow(outer.lag, found.lag),
         ..outer
     }
 }
 
-fn pairs(outer: &Sample, inner: &Sample) -> [(Interval, Interval); 9] {
+fn pairs(outer: &Sample, inner: &Sample) -> [(Interval, Interval); 10] {
     [
         (outer.f, inner.f),
         (outer.change, inner.change),
@@ -283,5 +288,6 @@ fn pairs(outer: &Sample, inner: &Sample) -> [(Interval, Interval); 9] {
         (outer.turbine, inner.turbine),
         (outer.governor, inner.governor),
         (outer.gap, inner.gap),
+        (outer.lag, inner.lag),
     ]
 }

@@ -185,7 +185,7 @@ fn unfollowed(number: &FleetLoop, at: &AtSample, f: Interval, blind: Interval) -
         high: from_gap.high.min(from_both.high),
     };
     // |g'| is at most |s| / T_G and at most R, and within the step s grows by what v and g move.
-    let time = number.known.governor_time;
+    let time = number.times.governor.low;
     let asked_move = number.gain_most * at.f_move;
     let share = number.step_s / time;
     let most = if share < 1.0 {
@@ -197,7 +197,9 @@ fn unfollowed(number: &FleetLoop, at: &AtSample, f: Interval, blind: Interval) -
     let s_move = asked_move + moved;
     let g = widened(at.g, moved);
     let s = widened(start, s_move);
+    // A T_G that is not known: the least bounds r by its size, the most by what is taken off it.
     let follows = governor.rate_gw_per_s * time;
+    let follows_most = governor.rate_gw_per_s * number.times.governor.high;
     let of_gap = |(slope, constant): (f64, f64)| Affine {
         f: slope * number.gain_mid,
         g: -slope,
@@ -226,9 +228,9 @@ fn unfollowed(number: &FleetLoop, at: &AtSample, f: Interval, blind: Interval) -
         least = least.plus(of_f(chord(at.f, steepest, constant)).minus());
     }
     // Governors that are surely behind: r is what is asked less what the rate lets through.
-    let behind = at.gap.mid() + added.low - s_move - follows;
+    let behind = at.gap.mid() + added.low - s_move - follows_most;
     if behind > 0.0 {
-        least = of_gap((1.0, added.low - s_move - follows));
+        least = of_gap((1.0, added.low - s_move - follows_most));
     }
     least.constant -= PAD_GW;
     above.constant += PAD_GW;
@@ -278,7 +280,7 @@ mod tests {
             let governor = Governor { deadband_hz, rate_gw_per_s: rate, output_gw: [lower, upper] };
             let number = number(governor, gain_radius);
             let g = g.clamp(lower, upper);
-            let real = Plant { governor_gain: -5.0 + gain_radius * gain_at, ..number.known };
+            let real = Plant { governor_gain: -5.0 + gain_radius * gain_at, ..plant().known };
             let around = |x: f64, width: f64| Interval { low: x - width * at, high: x + width * (1.0 - at) };
             // The sample, from which f and g have moved to here by no more than they can.
             let f_at = f + 0.01 * moved;

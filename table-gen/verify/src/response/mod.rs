@@ -12,6 +12,7 @@
 //! |---|---|
 //! | numbers of the loop, parameter bands | `fleet_loop` |
 //! | lines below and above the delivered participation | `lines` |
+//! | a plant that is not known, as a disturbance | `unknown`, `time_bands` |
 //! | governors with limits, as a disturbance | `governor` |
 //! | one functional, one sweep | `adjoint` |
 //! | the window of readings that act in a step | `window` |
@@ -38,6 +39,8 @@ mod proof;
 mod staged;
 #[cfg(test)]
 mod testing;
+mod time_bands;
+mod unknown;
 mod watched;
 mod window;
 
@@ -47,3 +50,4 @@ pub use meter::error_hz;
 pub use plan::{LOSS_BAND_GW, Summary, cases, examine_all};
 pub use proof::{Proof, case_of, verify};
 pub use staged::{examine_staged, verify_staged};
+pub use time_bands::TimeBands;

@@ -13,6 +13,8 @@ pub const LOSS_BAND_GW: f64 = 0.04;
 const INERTIA_CELL: f64 = 0.06;
 const GAIN_CELL: f64 = 0.06;
 const DAMPING_CELL_GW_PER_HZ: f64 = 0.2;
+/// The same of the time constants, relative to their middle.
+const TIME_CELL: f64 = 0.1;
 
 /// How finely cases are followed, in turn until one is good enough. A loss that moves may jump
 /// within a step, so its steps are short from the first.
@@ -53,7 +55,15 @@ pub fn cases(all: &Case, loss_band_gw: f64) -> Vec<Case> {
         LossProfile::Constant | LossProfile::NonDecreasing => split(all.assumed.loss, loss_band_gw),
     };
     let mut out = Vec::new();
-    for inverse_inertia in &inertia_cells {
+    // T_1 may be 0.
+    let times = all
+        .plant
+        .times
+        .cut(|band| split(band, (TIME_CELL * band.mid()).max(1e-9)));
+    let inertia_and_times = inertia_cells
+        .iter()
+        .flat_map(|inertia| times.iter().map(move |times| (inertia, times)));
+    for (inverse_inertia, times) in inertia_and_times {
         for governor_gain in &gains {
             for damping in &dampings {
                 for last in &losses {
@@ -72,6 +82,7 @@ pub fn cases(all: &Case, loss_band_gw: f64) -> Vec<Case> {
                         },
                         governor_gain: *governor_gain,
                         damping: *damping,
+                        times: *times,
                         ..all.plant
                     };
                     case.last = *last;

@@ -18,6 +18,7 @@ use super::fallback;
 use super::fleet_loop::{Assumed, LossProfile, PlantBand, RealLaw};
 use super::meter;
 use super::plan::{LOSS_BAND_GW, Summary, examine_all};
+use super::time_bands::TimeBands;
 use crate::VerifyError;
 
 /// What was found about a response.
@@ -161,6 +162,7 @@ fn case(law: &ResponseLaw, table: &TableView<'_>, spec: &Spec) -> Case {
             inertia: band(assumed.inertia_kw_s_per_hz),
             governor_gain: band(assumed.governor_gain_kw_per_hz),
             damping: band(assumed.damping_kw_per_hz),
+            times: TimeBands::of(spec),
             governor: Governor::of(spec),
         },
         law: real_law(law, tick_s, tick_most_s),
@@ -274,6 +276,10 @@ fn named(case: &Case) -> String {
         ("H", plant.inertia),
         ("K", plant.governor_gain),
         ("D", plant.damping),
+        ("T_G", plant.times.governor),
+        ("T_t", plant.times.turbine),
+        ("T_1", plant.times.lead),
+        ("T_2", plant.times.lag),
     ] {
         if range.low < range.high {
             name.push_str(&format!(", {what} {:.3} to {:.3}", range.low, range.high));

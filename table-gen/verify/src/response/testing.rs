@@ -1,6 +1,7 @@
 //! The loop of the product's bidirectional spec, for tests.
 
 use super::fleet_loop::{Assumed, LossProfile, PlantBand, RealLaw};
+use super::time_bands::TimeBands;
 use model::governor::Governor;
 use model::interval::Interval;
 use model::plant::Plant;
@@ -57,6 +58,7 @@ pub(super) fn plant() -> PlantBand {
         inertia: Interval::point(known.inertia),
         governor_gain: Interval::point(known.governor_gain),
         damping: Interval::point(known.damping),
+        times: TimeBands::known(&known),
         governor: Governor::LINEAR,
     }
 }

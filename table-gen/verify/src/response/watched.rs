@@ -5,6 +5,7 @@ use model::interval::Interval;
 use super::adjoint::{Choice, Functional, Past};
 use super::fleet_loop::FleetLoop;
 use super::governor;
+use super::unknown;
 use super::window::{Sample, Window, meet};
 
 /// The functionals that are bounded at every sample.
@@ -23,8 +24,10 @@ const CHANGE_SLOPE: usize = 4;
 const NET: usize = 5;
 const TURBINE: usize = 6;
 const FIRST_STATE: usize = 7;
-/// Watched only where rate or output of the governors is limited.
+/// Watched only where rate or output of the governors is limited, or time constants are not known.
 const GAP: usize = 10;
+/// Watched only where time constants are not known.
+const LAG: usize = 11;
 
 impl Watched {
     pub(super) fn new(number: &FleetLoop, window: &Window) -> Self {
@@ -46,9 +49,15 @@ impl Watched {
             },
         ];
         functionals.extend((1..4).map(Functional::state));
-        if governor::is_limited(&number.governor) {
+        if unknown::watches_gap(number) {
             functionals.push(Functional {
                 row: [number.gain_mid, -1.0, 0.0, 0.0],
+                ..Functional::state(0)
+            });
+        }
+        if number.unknown_times.is_some() {
+            functionals.push(Functional {
+                row: [0.0, 1.0, -1.0, 0.0],
                 ..Functional::state(0)
             });
         }
@@ -79,7 +88,7 @@ impl Watched {
             };
         let [g, l, p] = [0, 1, 2].map(|axis| ranges[FIRST_STATE + axis]);
         let g = meet(g, governor::output(&past.loop_.governor));
-        let governor = if ranges.len() > GAP {
+        let governor = if governor::is_limited(&past.loop_.governor) {
             g
         } else {
             Interval::ZERO
@@ -97,6 +106,7 @@ impl Watched {
             rate: 0.0,
             governor,
             gap: ranges.get(GAP).copied().unwrap_or(Interval::ZERO),
+            lag: ranges.get(LAG).copied().unwrap_or(Interval::ZERO),
         };
         (sample, [f, g, l, p])
     }

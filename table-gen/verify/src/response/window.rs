@@ -11,6 +11,7 @@ use super::adjoint::Step;
 use super::fleet_loop::{FleetLoop, LossProfile};
 use super::governor::{self, AtSample};
 use super::lines::{Delivered, Side};
+use super::unknown::{self, Differences, OfStep};
 
 /// |f| \[Hz\] up to which the bounds of the turbine's rate hold; past it nothing is claimed.
 pub(super) const F_MOST_HZ: f64 = 1.0;
@@ -74,11 +75,22 @@ pub(super) struct Sample {
     pub(super) rate: f64,
     /// g, where rate or output of the governors is limited; else 0.
     pub(super) governor: Interval,
-    /// `K_mid f - g`, there.
+    /// `K_mid f - g`, there and where time constants are not known; else 0.
     pub(super) gap: Interval,
+    /// `g - l`, where time constants are not known; else 0.
+    pub(super) lag: Interval,
 }
 
 impl Sample {
+    fn differences(&self) -> Differences {
+        Differences {
+            f: self.f,
+            gap: self.gap,
+            lag: self.lag,
+            turbine: self.turbine,
+        }
+    }
+
     /// What two bounds that both hold have in common.
     pub(super) fn meet(&self, other: &Self) -> Self {
         Self {
@@ -94,6 +106,7 @@ impl Sample {
             rate: self.rate.min(other.rate),
             governor: meet(self.governor, other.governor),
             gap: meet(self.gap, other.gap),
+            lag: meet(self.lag, other.lag),
         }
     }
 }
@@ -338,8 +351,13 @@ impl Samples<'_> {
             governor: at.and_then(|at| governor::disturbance(self.number, &at)),
             below,
             above,
-            f_most: (f.magnitude() + f_move) * (1.0 + 1e-9),
-            net_most: net_most * (1.0 + 1e-9),
+            unknown: OfStep {
+                f_most: (f.magnitude() + f_move) * (1.0 + 1e-9),
+                net_most: net_most * (1.0 + 1e-9),
+                times: sample.and_then(|sample| {
+                    unknown::added(self.number, &sample.differences(), f_move * (1.0 + 1e-9))
+                }),
+            },
             slack: self.slack_of(sample, spread, net_most, self.rise(k)),
             rate: self.number.inverse_inertia_most * net_most * (1.0 + 1e-9),
         }
@@ -359,11 +377,10 @@ impl Samples<'_> {
     fn turbine_rate(&self, sample: Option<&Sample>) -> f64 {
         let number = self.number;
         let [f, g, l, _] = number.chain_most(F_MOST_HZ);
-        let lead = number.known.lead_time / number.known.governor_time;
         let asked = g.max(number.gain_most * f);
-        let l_rate = (lead.abs() * asked + (1.0 - lead).abs() * g + l) / number.known.lag_time;
+        let l_rate = (number.times.lead_most(asked, g) + l) / number.times.lag.low;
         let start = sample.map_or(f64::INFINITY, |s| s.turbine.magnitude());
-        (start / number.known.turbine_time).max(l_rate) * (1.0 + 1e-9)
+        (start / number.times.turbine.low).max(l_rate) * (1.0 + 1e-9)
     }
 
     /// How far f may leave the chord in a step: a quarter of the step times the variation of f' in

@@ -7,7 +7,9 @@ use model::plant::Plant;
 use rand::RngExt;
 use rand_pcg::Pcg64;
 use rand_pcg::rand_core::SeedableRng;
-use verify::response::{Assumed, Case, Found, LossProfile, LossStage, PlantBand, RealLaw};
+use verify::response::{
+    Assumed, Case, Found, LossProfile, LossStage, PlantBand, RealLaw, TimeBands,
+};
 
 const FLEET_GW: f64 = 1.4;
 const TICK_S: f64 = 0.1;
@@ -33,7 +35,7 @@ const LAW: ResponseLaw = ResponseLaw {
     smallest_change_ppm: 50_000,
 };
 
-fn plant() -> Plant {
+pub(crate) fn plant() -> Plant {
     Plant {
         governor_gain: -5.0,
         governor_time: 2.5,
@@ -51,6 +53,8 @@ fn plant() -> Plant {
 pub(crate) struct Setting {
     pub(crate) loss: Interval,
     pub(crate) governor: Governor,
+    /// T_G, T_t, T_1 and T_2, drawn for every fleet.
+    pub(crate) times: TimeBands,
     /// Share of the chargers that gives all or nothing, as it suits the adversary.
     pub(crate) hostile_share: f64,
     /// Distance of a charger's levels \[ppm\].
@@ -81,6 +85,7 @@ impl Setting {
         Self {
             loss,
             governor,
+            times: TimeBands::known(&plant()),
             hostile_share: 0.0,
             smallest_change_ppm: LAW.smallest_change_ppm,
             mean_step_share: 1.0,
@@ -99,6 +104,7 @@ pub(crate) fn case(setting: Setting) -> Case {
             inertia: Interval::point(known.inertia),
             governor_gain: Interval::point(known.governor_gain),
             damping: Interval::point(known.damping),
+            times: setting.times,
             governor,
         },
         law: RealLaw {
@@ -149,6 +155,28 @@ pub(crate) enum Malice {
     TwoGroups,
 }
 
+/// A plant with time constants from their bands, by its seed: first every corner of them, then
+/// anywhere.
+fn drawn(times: TimeBands, seed: u64) -> Plant {
+    let mut rng = Pcg64::seed_from_u64(seed ^ 0x71ED);
+    let mut corner = seed % 32;
+    let mut time = |band: Interval| {
+        let share = match corner {
+            16.. => rng.random::<f64>(),
+            corner => (corner & 1) as f64,
+        };
+        corner = if corner < 16 { corner / 2 } else { corner };
+        band.low + (band.high - band.low) * share
+    };
+    Plant {
+        governor_time: time(times.governor),
+        turbine_time: time(times.turbine),
+        lead_time: time(times.lead),
+        lag_time: time(times.lag),
+        ..plant()
+    }
+}
+
 struct Charger {
     response: Response,
     phase: usize,
@@ -171,7 +199,7 @@ pub(crate) fn run(
     // The first ones, rounded down: no more than the share.
     let hostile = (setting.hostile_share * chargers as f64 + 1e-9).floor() as usize;
     let mut rng = Pcg64::seed_from_u64(seed);
-    let plant = plant();
+    let plant = drawn(setting.times, seed);
     let steps_per_tick = (TICK_S / H).round() as usize;
     let corner = rng.random_bool(0.5);
     let mut x = [0.02, 0.1, 0.06, 0.06].map(|r: f64| {

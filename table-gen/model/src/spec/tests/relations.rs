@@ -207,6 +207,10 @@ fn response(more: &[&str]) -> Vec<String> {
 #[test]
 fn what_games_do_not_cover_is_refused_by_its_key_and_taken_for_a_response() {
     let only_responses = [
+        "uncertainty.governor_time_s=[2, 3]",
+        "uncertainty.turbine_time_s=[0.4, 0.6]",
+        "uncertainty.lead_time_s=[1, 3]",
+        "uncertainty.lag_time_s=[10, 14]",
         "uncertainty.own_clocks=true",
         "uncertainty.participation_absolute=0.01",
         "meter.kind=zero-crossing",
@@ -248,6 +252,10 @@ fn intervals_are_the_right_way_round() {
         "uncertainty.inertia_gw_s_per_hz=[5, 2]",
         "uncertainty.governor_gain_gw_per_hz=[-4, -5]",
         "uncertainty.damping_gw_per_hz=[1, 0.8]",
+        "uncertainty.governor_time_s=[3, 2]",
+        "uncertainty.turbine_time_s=[0.6, 0.4]",
+        "uncertainty.lead_time_s=[3, 1]",
+        "uncertainty.lag_time_s=[14, 10]",
     ] {
         let key = option.split('=').next().unwrap();
         let error = Spec::load("paper-bi", &response(&[option])).unwrap_err();
