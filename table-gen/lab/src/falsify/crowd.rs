@@ -19,15 +19,63 @@ use model::discrepancy::arc_discrepancy;
 /// Parts of a tick.
 pub const PARTS: usize = 10;
 
+/// What a crowd may do, part for part.
+pub trait Answers {
+    /// The next part, at a true state: the least and the greatest response, as shares of the fleet.
+    fn part(&mut self, x: [f64; STATES]) -> (f64, f64);
+}
+
 /// How a meter errs within its bound.
 #[derive(Debug, Clone, Copy, PartialEq)]
-enum Error {
+pub(super) enum Error {
     /// At one end of it.
     Constant(f64),
     /// At one end for so many ticks, then at the other: a slope that is not there.
     Alternating(u32),
     /// Anywhere.
     Random,
+}
+
+impl Error {
+    /// The error of a tick's reading, in units of its bound.
+    pub(super) fn at(self, tick: u32, random: &mut Random) -> f64 {
+        match self {
+            Self::Constant(sign) => sign,
+            Self::Alternating(ticks) if (tick / ticks).is_multiple_of(2) => 1.0,
+            Self::Alternating(_) => -1.0,
+            Self::Random => 2.0 * random.unit() - 1.0,
+        }
+    }
+}
+
+/// What is drawn of a charger.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct DrawnMember {
+    /// How its meter errs.
+    pub(super) error: Error,
+    /// Part of the tick in which it decides.
+    pub(super) clock: usize,
+}
+
+/// So many chargers drawn, and what is drawn next. One crowd in four has one clock.
+pub(super) fn draw_members(number: usize, seed: u64) -> (Vec<DrawnMember>, Random) {
+    let mut random = Random::new(seed);
+    let one_clock = random.number().is_multiple_of(4);
+    let same_sign = random.number().is_multiple_of(2);
+    let clock = (random.number() % PARTS as u64) as usize;
+    let sign = random.sign();
+    let members = (0..number).map(|_| {
+        let error = match random.number() % 4 {
+            _ if same_sign => Error::Constant(sign),
+            0 => Error::Alternating(1 + (random.number() % 12) as u32),
+            1 => Error::Random,
+            _ => Error::Constant(random.sign()),
+        };
+        let own = (random.number() % PARTS as u64) as usize;
+        let clock = if one_clock { clock } else { own };
+        DrawnMember { error, clock }
+    });
+    (members.collect(), random)
 }
 
 /// One charger.
@@ -51,6 +99,43 @@ pub struct CrowdTimes {
     pub delay: (usize, usize),
     /// Lag of the meters.
     pub lag: usize,
+}
+
+/// Whose commands may act at a part.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) struct UnderWay {
+    /// Ticks in which they were decided.
+    pub(super) ticks: std::ops::Range<usize>,
+    /// Whether it may also be that none acts yet.
+    pub(super) or_nothing: bool,
+}
+
+impl CrowdTimes {
+    /// Commands that a charger remembers: what can be under way, and one more on each side.
+    pub(super) const fn kept(self) -> usize {
+        self.delay.1 / PARTS + 3
+    }
+
+    /// The commands that may act at a part, of a charger that decides in one part of each tick.
+    pub(super) fn under_way(self, part: usize, clock: usize) -> UnderWay {
+        // Ticks decided up to a part so long ago: those at clock, clock + PARTS, ...
+        let decided = |delay: usize| {
+            let since = (part + PARTS).checked_sub(clock + delay);
+            since.map_or(0, |parts| parts / PARTS)
+        };
+        let (oldest, latest) = (decided(self.delay.1), decided(self.delay.0));
+        // Before the first decision nothing acts.
+        UnderWay {
+            ticks: oldest.saturating_sub(1)..latest,
+            or_nothing: oldest == 0,
+        }
+    }
+
+    /// Whether at such a part of the tick others of a charger's commands may act than before.
+    pub(super) const fn moves(self, part: usize, clock: usize) -> bool {
+        let now = part % PARTS;
+        (clock + self.delay.0) % PARTS == now || (clock + self.delay.1) % PARTS == now
+    }
 }
 
 /// Fewest chargers with consecutive serial numbers, from which on to `most` every crowd's levels
@@ -82,8 +167,7 @@ pub struct Crowd<'t> {
 }
 
 impl<'t> Crowd<'t> {
-    /// A crowd drawn: so many chargers on a grid that has been in a state for long. One crowd in
-    /// four has one clock.
+    /// A crowd drawn: so many chargers on a grid that has been in a state for long.
     pub fn draw(
         table: &TableView<'t>,
         number: usize,
@@ -92,26 +176,14 @@ impl<'t> Crowd<'t> {
         rest: [f64; STATES],
         seed: u64,
     ) -> Self {
-        let mut random = Random::new(seed);
-        let one_clock = random.number().is_multiple_of(4);
-        let same_sign = random.number().is_multiple_of(2);
-        let clock = (random.number() % PARTS as u64) as usize;
-        let sign = random.sign();
-        // What can be under way, and one more on each side.
-        let kept = times.delay.1 / PARTS + 3;
-        let members = (0..number).map(|index| {
-            let error = match random.number() % 4 {
-                _ if same_sign => Error::Constant(sign),
-                0 => Error::Alternating(1 + (random.number() % 12) as u32),
-                1 => Error::Random,
-                _ => Error::Constant(random.sign()),
-            };
-            let own = (random.number() % PARTS as u64) as usize;
+        let (drawn, random) = draw_members(number, seed);
+        let kept = times.kept();
+        let members = drawn.iter().enumerate().map(|(index, drawn)| {
             let offset = LevelOffset::of_serial(index as u32);
             Member {
                 control: ControlLoop::with_table(Ok(table.clone())).with_offset(offset),
-                error,
-                clock: if one_clock { clock } else { own },
+                error: drawn.error,
+                clock: drawn.clock,
                 ticks: 0,
                 commands_ppm: vec![0; kept],
                 span_ppm: (0, 0),
@@ -127,20 +199,19 @@ impl<'t> Crowd<'t> {
             random,
         }
     }
+}
 
-    /// The next part, at a true state: the least and the greatest response, as shares of the fleet.
-    pub fn part(&mut self, x: [f64; STATES]) -> (f64, f64) {
+impl Answers for Crowd<'_> {
+    fn part(&mut self, x: [f64; STATES]) -> (f64, f64) {
         self.states.pop_back();
         self.states.push_front(x);
         let seen = self.states.back().copied().unwrap_or(x);
         let now = self.part % PARTS;
-        let (least, most) = self.times.delay;
         for member in &mut self.members {
             if member.clock == now {
                 member.decide(&seen, &self.bound, &mut self.random);
             }
-            let moves = |delay: usize| (member.clock + delay) % PARTS == now;
-            if moves(least) || moves(most) {
+            if self.times.moves(self.part, member.clock) {
                 let before = member.span_ppm;
                 member.span_ppm = member.span(self.part, self.times);
                 let after = member.span_ppm;
@@ -157,12 +228,7 @@ impl<'t> Crowd<'t> {
 
 impl Member<'_> {
     fn decide(&mut self, x: &[f64; STATES], bound: &[f64; STATES], random: &mut Random) {
-        let error = match self.error {
-            Error::Constant(sign) => sign,
-            Error::Alternating(ticks) if (self.ticks / ticks).is_multiple_of(2) => 1.0,
-            Error::Alternating(_) => -1.0,
-            Error::Random => 2.0 * random.unit() - 1.0,
-        };
+        let error = self.error.at(self.ticks, random);
         let read = |d: usize| ((x[d] + error * bound[d]) * f64::from(MICRO)).floor() as i32;
         let action = self.control.step(State(std::array::from_fn(read)));
         let kept = self.commands_ppm.len();
@@ -174,17 +240,10 @@ impl Member<'_> {
 
     /// Least and greatest of the commands that may act at a part.
     fn span(&self, part: usize, times: CrowdTimes) -> (u32, u32) {
-        // Ticks decided up to a part so long ago: those at clock, clock + PARTS, ...
-        let decided = |delay: usize| {
-            let since = (part + PARTS).checked_sub(self.clock + delay);
-            since.map_or(0, |parts| parts / PARTS)
-        };
-        let (oldest, latest) = (decided(times.delay.1), decided(times.delay.0));
+        let UnderWay { ticks, or_nothing } = times.under_way(part, self.clock);
         let kept = self.commands_ppm.len();
-        // Before the first decision nothing acts.
-        let first = oldest.saturating_sub(1);
-        let before = if oldest == 0 { Some(0) } else { None };
-        let commands = (first..latest).filter_map(|tick| self.commands_ppm.get(tick % kept));
+        let before = if or_nothing { Some(0) } else { None };
+        let commands = ticks.filter_map(|tick| self.commands_ppm.get(tick % kept));
         let all = commands.copied().chain(before);
         let (least, most) = all.fold((u32::MAX, 0), |(l, m), ppm| (l.min(ppm), m.max(ppm)));
         (least.min(most), most)

@@ -19,24 +19,22 @@
 
 use firmware::table::TableView;
 use model::governor::Governor;
-use model::plant::{Plant, STATES};
 use model::spec::{LossProfile, Spec};
 use model::stepper::Stepper;
 use model::verdict::{ClaimName, RealPath};
 use rayon::prelude::*;
 
-use super::adversaries::{Random, drawn_plant, within};
-use super::crowd::{Crowd, CrowdTimes, PARTS, fewest_members};
+use super::adversaries::Random;
+use super::crowd::{Answers, Crowd, CrowdTimes, PARTS, fewest_members};
+use super::draw::{Draw, MEMBERS_MOST};
 use super::found::Falsification;
+use super::judge::Judge;
+use super::readers::SharedCrowd;
 
-/// Chargers of a crowd, least and most.
-const MEMBERS: (u64, u64) = (8, 200);
+/// Fewest chargers of a crowd.
+const MEMBERS_LEAST: u64 = 8;
 /// Length of a trajectory \[s\]: twice the time to settle, and the steps of a loss before it.
 const TRAJECTORY_S: f64 = 150.0;
-/// Latest step of a loss that does not fall \[s\].
-const STEPS_UNTIL_S: f64 = 60.0;
-/// Most steps of such a loss.
-const STEPS_MAX: u64 = 4;
 /// Time for which the chargers watch the grid at rest \[s\].
 const QUIET_S: f64 = 5.0;
 /// Trajectories that are run side by side; the best of them is the next ones' model.
@@ -48,149 +46,6 @@ const SAMPLED_BATCH: u64 = 512;
 /// Length of a trajectory beyond the last step of its loss, where a spec's time to settle is short
 /// \[s\].
 const BEYOND_S: f64 = 20.0;
-/// Distance past a limit that counts \[Hz\]: far above the arithmetic's error.
-const MARGIN_HZ: f64 = 1e-6;
-
-/// Who chooses the response.
-#[derive(Debug, Clone, Copy, PartialEq)]
-enum Strategy {
-    Pump,
-    Late,
-    Low,
-    High,
-    BangBang {
-        period_s: f64,
-        phase: f64,
-    },
-    /// The response is the greatest where `direction · x > level`; 1 Hz weighs as much as 5 GW.
-    Functional {
-        direction: [f64; STATES],
-        level: f64,
-    },
-}
-
-impl Strategy {
-    fn draw(random: &mut Random) -> Self {
-        let side = |random: &mut Random| 2.0 * random.unit() - 1.0;
-        match random.number() % 8 {
-            0 => Self::Pump,
-            1 => Self::Late,
-            2 => Self::Low,
-            3 => Self::High,
-            // From 0.2 s to 40 s, evenly on a logarithmic scale.
-            4 | 5 => Self::BangBang {
-                period_s: 0.2 * 200f64.powf(random.unit()),
-                phase: random.unit(),
-            },
-            _ => Self::Functional {
-                direction: std::array::from_fn(|_| side(random)),
-                level: side(random),
-            },
-        }
-    }
-
-    /// A neighbour.
-    fn mutated(self, random: &mut Random) -> Self {
-        let near = |value: f64, random: &mut Random| value + 0.1 * (2.0 * random.unit() - 1.0);
-        match self {
-            Self::BangBang { period_s, phase } => Self::BangBang {
-                period_s: period_s * 1.2f64.powf(2.0 * random.unit() - 1.0),
-                phase: near(phase, random),
-            },
-            Self::Functional { direction, level } => Self::Functional {
-                direction: direction.map(|value| near(value, random)),
-                level: near(level, random),
-            },
-            other => other,
-        }
-    }
-
-    /// Whether the response is the greatest at a moment.
-    fn is_high(self, time_s: f64, x: &[f64; STATES], slope: f64) -> bool {
-        match self {
-            Self::Pump => slope > 0.0,
-            Self::Late => slope <= 0.0,
-            Self::Low => false,
-            Self::High => true,
-            Self::BangBang { period_s, phase } => (time_s / period_s + phase).fract() < 0.5,
-            Self::Functional { direction, level } => {
-                let scaled = 5.0 * direction[0] * x[0]
-                    + direction[1] * x[1]
-                    + direction[2] * x[2]
-                    + direction[3] * x[3];
-                scaled > level
-            }
-        }
-    }
-}
-
-/// Everything that is drawn for a trajectory.
-#[derive(Debug, Clone, PartialEq)]
-struct Draw {
-    plant: Plant,
-    initial: [f64; STATES],
-    /// Times \[s\] and sizes of the loss from then on \[GW\].
-    losses: Vec<(f64, f64)>,
-    strategy: Strategy,
-    members: usize,
-    seed: u64,
-}
-
-impl Draw {
-    fn new(spec: &Spec, seed: u64) -> Self {
-        let mut random = Random::new(seed);
-        let plant = drawn_plant(&mut random, spec);
-        let initial = &spec.uncertainty.initial;
-        let initial =
-            std::array::from_fn(|d| within(&mut random, [initial.lower[d], initial.upper[d]]));
-        let losses = losses(spec, &mut random);
-        let (least, most) = (fewest(spec, MEMBERS.0), MEMBERS.1);
-        Self {
-            plant,
-            initial,
-            losses,
-            strategy: Strategy::draw(&mut random),
-            members: (least + random.number() % (most - least + 1)) as usize,
-            seed: random.number(),
-        }
-    }
-
-    fn name(&self) -> String {
-        format!(
-            "{:?} against {} chargers, losses {:?} (s, GW), H = {:.3}, seed {}",
-            self.strategy, self.members, self.losses, self.plant.inertia, self.seed
-        )
-    }
-}
-
-/// Fewest chargers within a spec's hypotheses, at least so many.
-fn fewest(spec: &Spec, least: u64) -> u64 {
-    fewest_members(spec.uncertainty.level_discrepancy, least, MEMBERS.1)
-}
-
-/// A loss by the spec's profile.
-fn losses(spec: &Spec, random: &mut Random) -> Vec<(f64, f64)> {
-    let [low, high] = spec.uncertainty.loss_gw;
-    let mut size = |least: f64| match random.number() % 4 {
-        0 => least,
-        1 => high,
-        _ => least + (high - least) * random.unit(),
-    };
-    let first = (0.0, size(low));
-    if spec.uncertainty.loss_profile == LossProfile::Constant {
-        return vec![first];
-    }
-    // A band's adversary moves the loss with the response, see `run`; here are its upward steps.
-    let mut out = vec![first];
-    let steps = random.number() % STEPS_MAX;
-    let mut times: Vec<f64> = (0..steps).map(|_| STEPS_UNTIL_S * random.unit()).collect();
-    times.sort_by(f64::total_cmp);
-    for time_s in times {
-        let least = out.last().map_or(low, |(_, gw)| *gw);
-        out.push((time_s, least + (high - least) * random.unit()));
-    }
-    out
-}
 
 /// How a trajectory ended.
 struct Outcome {
@@ -206,6 +61,8 @@ pub(super) struct Fleets<'a> {
     spec: &'a Spec,
     tick_s: f64,
     times: CrowdTimes,
+    /// Fewest chargers of a crowd in the search for the worst, and where plants are sampled.
+    fewest: [u64; 2],
 }
 
 impl<'a> Fleets<'a> {
@@ -218,7 +75,11 @@ impl<'a> Fleets<'a> {
         // Inwards: a trajectory must be one that the spec allows.
         let (least, most) = (parts(least) - 1e-9, parts(most) + 1e-9);
         let least = least.ceil().max(0.0) as usize;
+        // Where the proof knows the levels, as few as are shifted that evenly.
+        let assumed = spec.uncertainty.level_discrepancy;
+        let fewest = |least| fewest_members(assumed, least, MEMBERS_MOST);
         Self {
+            fewest: [MEMBERS_LEAST, SAMPLED_MEMBERS.0].map(fewest),
             table,
             spec,
             tick_s,
@@ -248,7 +109,7 @@ impl<'a> Fleets<'a> {
                         seed: random.number(),
                         ..best.clone()
                     },
-                    _ => Draw::new(self.spec, random.number()),
+                    _ => Draw::new(self.spec, self.fewest[0], random.number()),
                 })
                 .collect();
             let outcomes: Vec<Outcome> =
@@ -284,15 +145,13 @@ impl<'a> Fleets<'a> {
             violation: None,
         };
         let mut random = Random::new(seed);
-        // Where the proof knows the levels, as few as are shifted that evenly.
-        let (least, more) = SAMPLED_MEMBERS;
-        let least = fewest(self.spec, least);
-        let most = least + more - 1;
+        let least = self.fewest[1];
+        let most = least + SAMPLED_MEMBERS.1 - 1;
         while out.trajectories < runs && out.violation.is_none() {
             let count = (runs - out.trajectories).min(SAMPLED_BATCH);
             let draws: Vec<Draw> = (0..count)
                 .map(|_| {
-                    let draw = Draw::new(self.spec, random.number());
+                    let draw = Draw::new(self.spec, self.fewest[0], random.number());
                     let members = (least + random.number() % (most - least + 1)) as usize;
                     Draw { members, ..draw }
                 })
@@ -328,12 +187,22 @@ impl<'a> Fleets<'a> {
     }
 
     fn run(&self, draw: &Draw, keep: bool) -> Outcome {
+        let (bound, rest) = (self.spec.uncertainty.measurement, draw.initial);
+        let (table, members, times) = (self.table, draw.members, self.times);
+        match SharedCrowd::draw(table, members, times, bound, rest, draw.seed) {
+            Some(crowd) => self.follow(draw, crowd, keep),
+            None => {
+                let crowd = Crowd::draw(table, members, times, bound, rest, draw.seed);
+                self.follow(draw, crowd, keep)
+            }
+        }
+    }
+
+    fn follow(&self, draw: &Draw, mut crowd: impl Answers, keep: bool) -> Outcome {
         let uncertainty = &self.spec.uncertainty;
         let part_s = self.tick_s / PARTS as f64;
         let step = Stepper::new(&draw.plant, Governor::of(self.spec), part_s);
-        let bound = uncertainty.measurement;
         let (mut x, rest) = (draw.initial, draw.initial);
-        let mut crowd = Crowd::draw(self.table, draw.members, self.times, bound, rest, draw.seed);
         for _ in 0..(QUIET_S / self.tick_s).ceil() as usize * PARTS {
             crowd.part(rest);
         }
@@ -402,53 +271,6 @@ impl<'a> Fleets<'a> {
             breach: None,
             frequency,
         }
-    }
-}
-
-/// The claims of a spec about f.
-struct Judge<'s> {
-    spec: &'s Spec,
-    /// When f first left I1, since the loss last rose \[s\].
-    left_s: Option<f64>,
-    since_s: f64,
-    margin_hz: f64,
-}
-
-impl<'s> Judge<'s> {
-    const fn new(spec: &'s Spec) -> Self {
-        Self {
-            spec,
-            left_s: None,
-            since_s: 0.0,
-            margin_hz: f64::INFINITY,
-        }
-    }
-
-    /// Takes f \[Hz\] at a time \[s\], with the time since which the loss stands \[s\]; the claim
-    /// that is broken.
-    fn judge(&mut self, time_s: f64, since_s: f64, f: f64) -> Option<ClaimName> {
-        let requirements = &self.spec.requirements;
-        if let Some(limit) = requirements.containment_hz {
-            self.margin_hz = self.margin_hz.min(f - limit);
-            if f < limit - MARGIN_HZ {
-                return Some(ClaimName::Containment);
-            }
-        }
-        if since_s > self.since_s {
-            (self.since_s, self.left_s) = (since_s, None);
-        }
-        let [outer_low, outer_high] = requirements.outer_hz;
-        if self.left_s.is_none() && (f < outer_low || f > outer_high) {
-            self.left_s = Some(time_s);
-        }
-        let due_s = self.left_s? + requirements.settle_within_s;
-        if !requirements.stay || time_s < due_s {
-            return None;
-        }
-        let [low, high] = requirements.inner_hz;
-        self.margin_hz = self.margin_hz.min(f - low).min(high - f);
-        let outside = f < low - MARGIN_HZ || f > high + MARGIN_HZ;
-        outside.then_some(ClaimName::Settle)
     }
 }
 

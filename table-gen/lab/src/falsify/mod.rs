@@ -10,6 +10,9 @@
 //! | `under_way` | commands that act late, anywhere within a range of delays |
 //! | [`adversaries`] | who chooses the disturbances |
 //! | [`crowd`] | chargers with own clocks and errors; commands act anywhere within the delays |
+//! | `readers` | the same crowd where the law is a response: what reads the same decides once |
+//! | `draw` | what is drawn of a trajectory against a fleet |
+//! | `judge` | the claims about f along it |
 //! | `fleet` | the search against a whole fleet, on a plant and losses that are drawn |
 //! | [`witness`] | for a verdict's failure: a real trajectory that shows it |
 //!
@@ -28,8 +31,11 @@
 
 pub mod adversaries;
 pub mod crowd;
+mod draw;
 mod fleet;
 mod found;
+mod judge;
+mod readers;
 pub mod trajectory;
 mod under_way;
 pub mod witness;
