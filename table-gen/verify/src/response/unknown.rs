@@ -36,8 +36,8 @@
 //! |l - p| <= |(l - p)(0)| + h (i_2 |g - l| + r |s|)
 //! ```
 //!
-//! since a positive rate only takes from a difference. None of this needs a time constant to stay
-//! what it is: the proof lets all of them move within their bands.
+//! since a positive rate only takes from a difference. These bounds would let the time constants
+//! move within their bands; the bound of p' in `window` needs a T_t that stays what it is.
 
 use model::interval::Interval;
 use model::plant::STATES;
