@@ -44,7 +44,7 @@ pub(super) fn within(random: &mut Random, [low, high]: [f64; 2]) -> f64 {
     }
 }
 
-/// A plant within a spec's bands.
+/// A plant whose H, 1/R_eq and D are within a spec's bands.
 pub(super) fn drawn_plant(random: &mut Random, spec: &Spec) -> Plant {
     Plant {
         inertia: within(random, spec.inertia_band()),

@@ -3,7 +3,7 @@
 use model::plant::{Plant, STATES};
 use model::spec::{LossProfile, Spec};
 
-use super::adversaries::Random;
+use super::adversaries::{Random, drawn_plant, within};
 
 /// Most chargers of a crowd.
 pub(super) const MEMBERS_MOST: u64 = 200;
@@ -101,12 +101,7 @@ impl Draw {
     /// Everything by its seed, with at least so many chargers.
     pub(super) fn new(spec: &Spec, least: u64, seed: u64) -> Self {
         let mut random = Random::new(seed);
-        let mut plant = Plant {
-            inertia: within(&mut random, spec.inertia_band()),
-            governor_gain: within(&mut random, spec.governor_gain_band()),
-            damping: within(&mut random, spec.damping_band()),
-            ..Plant::new(spec)
-        };
+        let mut plant = drawn_plant(&mut random, spec);
         let initial = &spec.uncertainty.initial;
         let initial =
             std::array::from_fn(|d| within(&mut random, [initial.lower[d], initial.upper[d]]));
@@ -139,15 +134,6 @@ impl Draw {
             "{:?} against {} chargers, losses {:?} (s, GW), {:?}, seed {}",
             self.strategy, self.members, self.losses, self.plant, self.seed
         )
-    }
-}
-
-/// Anywhere in a band, half of the time at an end of it.
-fn within(random: &mut Random, [low, high]: [f64; 2]) -> f64 {
-    match random.number() % 4 {
-        0 => low,
-        1 => high,
-        _ => low + (high - low) * random.unit(),
     }
 }
 
