@@ -58,18 +58,20 @@ fn half_diagonal(block: Block, width: f64) -> f64 {
 
 impl Cover {
     /// The cover for bins of this half-width of the drive and a loss that moves by so much \[GW\],
-    /// for a table with cells of these widths \[Hz, GW\]. Nothing if the radii do not settle.
+    /// for a table with cells of these widths \[Hz, GW\]; `beside` is what else a step may add, by
+    /// block. Nothing if the radii do not settle.
     pub(crate) fn new(
         modes: &Modes,
         flights: &Flights,
         ticks: u32,
-        [bin_gw, moving_gw]: [f64; 2],
+        ([bin_gw, moving_gw], beside): ([f64; 2], &[f64]),
         cells: [f64; STATES],
     ) -> Option<Self> {
         let blocks = modes.blocks.clone();
         let added = |block: usize, ticks: u32| {
             let (_, reach, moving) = flights.of_block(block, ticks);
-            reach * bin_gw + moving * moving_gw
+            let beside = beside.get(block).copied().unwrap_or(0.0);
+            reach * bin_gw + moving * moving_gw + beside
         };
         // Effect of a unit of a block, in cells of the table.
         let effect = |block: Block| {
@@ -182,6 +184,55 @@ impl Cover {
             }
         }
         Some(cell)
+    }
+
+    /// Points whose sets together hold this one: a single one where that is enough. Nothing where
+    /// there are more than `most`.
+    ///
+    /// In each block a lattice of every n-th point is taken, n such that half a diagonal of it is
+    /// below the radius: the nearest lattice point of any state then holds it. The hundredth that is
+    /// left is far above the roundings.
+    pub(crate) fn cells(&self, ball: &Ball, left: bool, most: usize) -> Option<Vec<[i32; STATES]>> {
+        if let Some(cell) = self.cell(ball, left) {
+            return Some(vec![cell]);
+        }
+        let radii = if left {
+            &self.radius_left
+        } else {
+            &self.radius
+        };
+        let mut cells = vec![[0; STATES]];
+        for (index, block) in self.blocks.iter().enumerate() {
+            let step = self.step(index, left);
+            let every = (0.99 * radii[index] / half_diagonal(*block, step))
+                .floor()
+                .max(1.0);
+            let stride = every * step;
+            for axis in block.axes() {
+                let (centre, reach) = (ball.centre[axis], ball.radius[index]);
+                let first = ((centre - reach) / stride).floor();
+                let last = ((centre + reach) / stride).ceil();
+                // Also where the quotients are no numbers.
+                let few =
+                    last - first < 1e4 && (last - first + 1.0) * cells.len() as f64 <= most as f64;
+                if !few {
+                    return None;
+                }
+                let along = (first as i32..=last as i32).map(|at| at * every as i32);
+                let along: Vec<i32> = along.collect();
+                cells = cells
+                    .into_iter()
+                    .flat_map(|cell| {
+                        along.iter().map(move |at| {
+                            let mut cell = cell;
+                            cell[axis] = *at;
+                            cell
+                        })
+                    })
+                    .collect();
+            }
+        }
+        Some(cells)
     }
 
     fn step(&self, block: usize, left: bool) -> f64 {

@@ -124,6 +124,11 @@ impl Regions {
         micro + Interval::hull(-self.error[axis], self.error[axis])
     }
 
+    /// Largest magnitude that may be measured on each axis \[micro-units\].
+    pub(crate) fn magnitude(&self, ball: &Ball) -> [f64; STATES] {
+        std::array::from_fn(|axis| self.measured(axis, ball).magnitude())
+    }
+
     /// Where a measured f may be.
     pub(crate) fn inside(&self, ball: &Ball) -> Inside {
         let f = self.measured(AXIS_F, ball);

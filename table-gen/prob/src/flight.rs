@@ -6,6 +6,8 @@
 //! Between ticks, the time is cut into steps of [`STEP_S`]. Within the step from s, f is `e_f tube
 //! Φ(s) x + (γ(s) + [0, h] e_f tube Φ(s) b) v`, tube enclosing exp(A σ) for all σ of a step.
 
+use std::ops::Range;
+
 use firmware::units::{AXIS_F, STATES};
 use model::flow::{Flow, Matrix, Vector, absolute_integral, apply, product, tube};
 use model::interval::Interval;
@@ -160,14 +162,54 @@ impl Flights {
 
     /// The lowest frequency \[Hz\] in the first so many ticks.
     pub(crate) fn lowest(&self, ball: &Ball, net: NetPower, ticks: u32) -> f64 {
-        let mut lowest = f64::INFINITY;
-        for tick in &self.ticks[..ticks as usize] {
+        self.range(ball, net, 0..ticks).low
+    }
+
+    /// The frequencies \[Hz\] in some ticks, at least one, of a power that is held from tick 0 on.
+    pub(crate) fn range(&self, ball: &Ball, net: NetPower, ticks: Range<u32>) -> Interval {
+        let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
+        for tick in &self.ticks[ticks.start as usize..ticks.end as usize] {
             for step in &tick.steps {
                 let f = along(&step.row, &step.lengths, ball) + step.gamma * net.range;
-                lowest = lowest.min(f.low);
+                (low, high) = (low.min(f.low), high.max(f.high));
             }
         }
-        (lowest - (self.moving_f * net.moving).next_up()).next_down()
+        let moving = (self.moving_f * net.moving).next_up();
+        Interval {
+            low: (low - moving).next_down(),
+            high: (high + moving).next_up(),
+        }
+    }
+
+    /// Takes away from a set what a net power has added to it over the last so many ticks. The
+    /// power may have varied within its range.
+    pub(crate) fn without(&self, ball: &Ball, power: NetPower, ticks: u32) -> Ball {
+        let span = &self.spans[ticks as usize];
+        let middle = Interval::point(power.range.mid());
+        let half = if power.range.low == power.range.high {
+            0.0
+        } else {
+            power.range.radius()
+        };
+        let at: Vector<STATES> =
+            std::array::from_fn(|i| Interval::point(ball.centre[i]) - span.drive[i] * middle);
+        let varied = (half + power.moving).next_up();
+        let mut out = self.pushed(ball, &at);
+        for (radius, moving) in out.radius.iter_mut().zip(&span.moving) {
+            *radius = ((*radius + (moving * varied).next_up()).next_up() + CLOCK).next_up();
+        }
+        out
+    }
+
+    /// A set with another centre, which is known within bounds.
+    pub(crate) fn pushed(&self, ball: &Ball, centre: &Vector<STATES>) -> Ball {
+        let off = centre.map(|axis| Interval::point(axis.radius()));
+        let radii = self.blocks.iter().zip(&ball.radius);
+        let grown = radii.map(|(block, radius)| (Modes::length(&off, *block) + radius).next_up());
+        Ball {
+            centre: centre.map(Interval::mid),
+            radius: grown.collect(),
+        }
     }
 
     /// In how many of the first so many ticks f may be below a limit \[Hz\].

@@ -7,13 +7,17 @@ use firmware::units::{MICRO, STATES, State};
 use model::flow::Flow;
 use model::plant::Plant;
 use model::spec::Spec;
-use rand::{Rng, SeedableRng};
+use rand::SeedableRng;
 use rand_pcg::Pcg64;
 use rayon::prelude::*;
 use serde::Serialize;
 use statrs::distribution::{Beta, ContinuousCDF};
 
+use crate::kept::Kept;
+pub use crate::kept::Run;
 use crate::participation::Participation;
+use crate::under_way::{Draw, UnderWay};
+use crate::unit::unit;
 
 /// Samples of f in a tick.
 const SAMPLES: u32 = 5;
@@ -39,15 +43,6 @@ pub struct Runs {
     pub worst_seed: u64,
 }
 
-/// One run.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Run {
-    /// Whether the promise was kept.
-    pub kept: bool,
-    /// Lowest frequency \[Hz\].
-    pub lowest_hz: f64,
-}
-
 /// The closed loop in plain numbers.
 pub struct Sampled<'a> {
     table: &'a TableView<'a>,
@@ -60,7 +55,7 @@ pub struct Sampled<'a> {
 }
 
 impl<'a> Sampled<'a> {
-    /// The closed loop of a table without Hold, over a horizon \[s\].
+    /// The closed loop of a table of laws by games, over a horizon \[s\].
     pub fn new(
         table: &'a TableView<'a>,
         spec: &'a Spec,
@@ -95,18 +90,17 @@ impl<'a> Sampled<'a> {
         let initial = &uncertainty.initial;
         let mut x: [f64; STATES] =
             std::array::from_fn(|d| between(&mut random, [initial.lower[d], initial.upper[d]]));
-        let containment = self
-            .spec
-            .requirements
-            .containment_hz
-            .unwrap_or(f64::NEG_INFINITY);
+        let mut kept = Kept::new(self.table, self.spec);
         let tick_s = f64::from(header.tick_ms) / 1000.0;
-        let settle = (self.spec.requirements.settle_within_s / tick_s).floor() as u32;
-        let (mut state, mut delivered, mut clock) = (PhaseState::INITIAL, 0.0, 0u32);
-        let (mut age, mut lowest) = (None::<u32>, x[0]);
+        let mut fleet = UnderWay::new(self.table, self.spec, tick_s / f64::from(SAMPLES));
+        let (mut state, mut clock) = (PhaseState::INITIAL, 0u32);
+        kept.see(x[0]);
         // The event comes between two ticks: whole fifths of a tick here.
         let offset = (unit(&mut random) * f64::from(SAMPLES)) as u32;
-        self.fly(&mut x, -loss, offset, &mut lowest);
+        for _ in 0..offset {
+            self.fly(&mut x, -loss);
+            kept.see(x[0]);
+        }
         for _ in 0..self.ticks {
             let error: [f64; STATES] = std::array::from_fn(|d| {
                 between(
@@ -118,75 +112,47 @@ impl<'a> Sampled<'a> {
                 ((x[d] + error[d]) * f64::from(MICRO)).floor() as i32
             }));
             let was = state;
-            let (next, decision) = state.step(self.table, measured);
+            let ahead = || fleet.ahead(self.table, measured);
+            let (next, decision) = state.step_ahead(self.table, measured, ahead);
             state = next;
+            kept.decided(next.phase, decision);
             let Decision::Level(level) = decision else {
-                return Run {
-                    kept: false,
-                    lowest_hz: lowest,
-                };
+                return kept.run();
             };
             let redrawn = match next.phase {
                 Phase::NoControl | Phase::Fallback | Phase::Response => false,
                 Phase::Fixed => was.phase != Phase::Fixed || clock == 0,
                 Phase::C1 | Phase::C2 | Phase::Hold => was.ticks_left == 0,
             };
-            match next.phase {
-                Phase::NoControl => {}
-                Phase::Fixed => {
-                    if age.is_some_and(|age| age > settle) {
-                        return Run {
-                            kept: false,
-                            lowest_hz: lowest,
-                        };
-                    }
-                    age = None;
-                }
-                _ => {
-                    let ran = age.unwrap_or(1);
-                    if ran > settle {
-                        return Run {
-                            kept: false,
-                            lowest_hz: lowest,
-                        };
-                    }
-                    age = Some(ran);
-                }
-            }
-            if redrawn {
+            let draw = redrawn.then(|| {
                 let command = f64::from(header.participation(level).ppm()) / f64::from(MICRO);
-                delivered = self.draw(&mut random, command);
                 clock = u32::from(header.period_ticks);
+                Draw {
+                    delivered: self.draw(&mut random, command),
+                    changes: next.level != was.level,
+                }
+            });
+            fleet.tick(level, draw);
+            for _ in 0..SAMPLES {
+                let delivered = fleet.delivered(&mut random);
+                self.fly(&mut x, self.fleet_gw * delivered - loss);
+                kept.see(x[0]);
             }
-            self.fly(
-                &mut x,
-                self.fleet_gw * delivered - loss,
-                SAMPLES,
-                &mut lowest,
-            );
-            if lowest < containment {
-                return Run {
-                    kept: false,
-                    lowest_hz: lowest,
-                };
+            kept.tick();
+            if !kept.holds {
+                return kept.run();
             }
             clock = clock.saturating_sub(1);
-            age = age.map(|age| age + 1);
         }
-        Run {
-            kept: true,
-            lowest_hz: lowest,
-        }
+        kept.run()
     }
 
-    fn fly(&self, x: &mut [f64; STATES], v: f64, samples: u32, lowest: &mut f64) {
-        for _ in 0..samples {
-            *x = std::array::from_fn(|i| {
-                let free: f64 = (0..STATES).map(|j| self.step.0[i][j] * x[j]).sum();
-                free + self.step.1[i] * v
-            });
-            *lowest = lowest.min(x[0]);
-        }
+    /// One sample.
+    fn fly(&self, x: &mut [f64; STATES], v: f64) {
+        *x = std::array::from_fn(|i| {
+            let free: f64 = (0..STATES).map(|j| self.step.0[i][j] * x[j]).sum();
+            free + self.step.1[i] * v
+        });
     }
 
     fn draw(&self, random: &mut Pcg64, u: f64) -> f64 {
@@ -238,11 +204,6 @@ impl<'a> Sampled<'a> {
             worst_seed,
         })
     }
-}
-
-/// A double in \[0, 1).
-fn unit(random: &mut Pcg64) -> f64 {
-    (random.next_u64() >> 11) as f64 * 2f64.powi(-53)
 }
 
 /// A normal number, by the method of Box and Muller.

@@ -127,8 +127,12 @@ pub(super) fn run(args: &MaximiseArgs) -> Result<(), Failure> {
     }
     let known = before.unwrap_or(0.0);
     let Some((bound, chosen, asked)) = best.filter(|(bound, ..)| *bound > known) else {
+        let at_most = rounds
+            .iter()
+            .map(|round| round.at_most)
+            .fold(known, f64::max);
         return Err(Failure::No(format!(
-            "no other levels with a larger bound than {known:.9} were found; --back and --rounds look farther, a smaller --bin-gw leaves the adversary less"
+            "no other levels with a larger bound than {known:.9} were found; with any levels in the cells that were open it is at most {at_most:.9} on these sets; --back and --rounds look farther, a smaller --bin-gw leaves the adversary less"
         )));
     };
     let asked: Vec<(Law, [u16; STATES])> =

@@ -40,7 +40,8 @@ pub(super) struct ProbArgs {
     /// default: chance.noise_hz, or none
     #[arg(long, value_name = "HZ")]
     noise_hz: Option<f64>,
-    /// Write the chain in Storm's format (laws by games, with a participation; exact is one)
+    /// Write the chain in Storm's format (laws by games, with or without Hold, delays of at most a
+    /// period; with a participation, exact is one)
     #[arg(long, value_name = "FILE")]
     drn: Option<PathBuf>,
     /// Write the chain as PRISM's explicit files BASE.tra and BASE.lab
@@ -186,9 +187,13 @@ fn exported(args: &ProbArgs, spec: &Spec, answer: &Answer) -> Result<(), Failure
         return Ok(());
     }
     let Some(chain) = &answer.chain else {
-        return Err(Failure::BadInput(
-            "--drn, --prism: there is no chain; laws by games have one where --participation is given (exact is one)".to_owned(),
-        ));
+        let why = answer
+            .no_chain
+            .as_deref()
+            .unwrap_or("laws by games have one where --participation is given (exact is one)");
+        return Err(Failure::BadInput(format!(
+            "--drn, --prism: there is no chain; {why}"
+        )));
     };
     let fail = |error: std::io::Error| Failure::bad(error);
     if let Some(path) = &args.drn {

@@ -2,7 +2,7 @@
 //! and the report's section with both.
 
 use ::prob::analysis::{Answer, Question};
-use ::prob::closed_loop::steps_in;
+use ::prob::closed_loop::Pace;
 use ::prob::participation::{Drawn, Participation};
 use ::prob::union::draws_in;
 use firmware::table::Header;
@@ -215,7 +215,7 @@ fn draws(header: &Header, question: &Question, time_s: f64) -> u64 {
         return draws_in(time_s, question.draw_interval_s);
     }
     let ticks = (time_s * 1e3 / f64::from(header.tick_ms)).ceil() as u32;
-    u64::from(steps_in(ticks, u32::from(header.period_ticks)))
+    u64::from(Pace::of(header).steps_in(ticks))
 }
 
 /// The distribution, and a normal one with other deviations.

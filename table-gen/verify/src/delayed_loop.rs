@@ -202,6 +202,7 @@ fn of_prediction(
             segment,
             expected: Drive::of(expected.first().copied().unwrap_or(Interval::ZERO)),
             reach,
+            estimates,
         }),
         limit,
     }

@@ -30,6 +30,8 @@ pub(crate) struct CommandDelay {
     pub(crate) expected: Drive,
     /// Magnitudes at the trigger for which the prediction's error is known \[micro-units\].
     pub(crate) reach: [f64; STATES],
+    /// The same of every later estimate \[micro-units\].
+    pub(crate) estimates: [f64; STATES],
 }
 
 /// What is known at a decision.

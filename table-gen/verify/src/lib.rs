@@ -11,6 +11,7 @@
 //! | a stretch of time with a held input, and the frequency within it | `held_input` |
 //! | what the state that is decided on says of the real one | `estimate_error` |
 //! | the same where commands act late | `delayed_loop` |
+//! | the same for whoever knows what was delivered | `prediction_error` |
 //! | a period whose first part is under two commands | `changeover` |
 //! | tight sets of states | `zonotope` |
 //! | the states on which the phase machine decides alike | `regions` |
@@ -72,6 +73,7 @@ mod no_control;
 mod outcome;
 mod path;
 mod plant_band;
+mod prediction_error;
 mod quiet;
 mod regions;
 pub mod response;
@@ -82,6 +84,7 @@ mod tight_sets;
 mod zonotope;
 
 pub use error::VerifyError;
+pub use prediction_error::{PredictionError, prediction_error};
 
 use model::hex::hex;
 use model::verdict::{Claim, ClaimName, Counterexample, Counts, Method, Verdict};

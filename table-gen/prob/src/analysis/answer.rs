@@ -127,6 +127,9 @@ pub struct Answer {
     /// The largest chain, to be exported.
     #[serde(skip)]
     pub chain: Option<Chain>,
+    /// Why there is no chain, where one was asked for.
+    #[serde(skip)]
+    pub no_chain: Option<String>,
     /// Its steps.
     pub steps: u32,
 }

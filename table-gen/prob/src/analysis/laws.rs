@@ -12,7 +12,7 @@ use model::spec::Spec;
 use super::answer::{AnalysisError, Answer, Cut, Layer, Layers, Question};
 use super::certain;
 use crate::bands::BandProof;
-use crate::closed_loop::{self, ClosedLoop, ClosedLoopError};
+use crate::closed_loop::{self, ClosedLoop, ClosedLoopError, Pace};
 use crate::loss::{LossBand, Losses};
 use crate::participation::{Drawn, Participation};
 use crate::{reward, value};
@@ -94,7 +94,12 @@ impl<'a> Laws<'a> {
         let certain = Losses::certain(self.spec.uncertainty.loss_gw);
         let losses = question.losses.as_ref().unwrap_or(&certain);
         let mut own: Option<OfDraws> = None;
-        if let (Some(kind), Some(_)) = (&question.participation, &question.losses) {
+        // Of a single size nothing else is asked.
+        let several = question
+            .losses
+            .as_ref()
+            .filter(|losses| losses.bands.len() > 1);
+        if let (Some(kind), Some(_)) = (&question.participation, several) {
             let proof = self.proven(certain.bands[0], &|| go_on(0.0))?;
             own = Some(self.of_draws(kind, &proof, &|| go_on(0.0))?);
         }
@@ -143,7 +148,7 @@ impl<'a> Laws<'a> {
     /// Steps that may begin within the horizon; each has one draw at most.
     fn steps(&self) -> u32 {
         let ticks = (self.question.settings.horizon_s / self.tick_s).ceil() as u32;
-        closed_loop::steps_in(ticks, self.period_ticks)
+        Pace::of(&self.table.header()).steps_in(ticks)
     }
 
     fn of_draws(
@@ -159,6 +164,9 @@ impl<'a> Laws<'a> {
             .map(|error| kind.all_within(u64::from(self.steps()), error, absolute));
         let mut spec = self.spec.clone();
         spec.uncertainty.loss_gw = [proof.band.low_gw, proof.band.high_gw];
+        // What is drawn takes the place of what the spec leaves to an adversary.
+        spec.uncertainty.participation = 0.0;
+        spec.uncertainty.participation_absolute = 0.0;
         let settings = &self.question.settings;
         let built = closed_loop::build(self.table, &spec, kind, settings, &|_, _| go_on());
         let chain = match built {
@@ -202,6 +210,7 @@ impl<'a> Laws<'a> {
             seconds_below_49_5: None,
             below: None,
             chain: None,
+            no_chain: None,
             steps: 0,
         }
     }
@@ -222,12 +231,22 @@ impl<'a> Laws<'a> {
                 self.steps()
             )
         });
+        let at = match self
+            .question
+            .losses
+            .as_ref()
+            .map(|losses| &losses.bands[..])
+        {
+            Some([only]) => format!("a loss of {} GW", only.high_gw),
+            _ => "the spec's loss".to_owned(),
+        };
         let mut how: Vec<String> = union.into_iter().collect();
         let chain = match own.chain {
             // Neither bound exists: what is missing is the answer.
             Err(error) if own.union.is_none() => return Err(error.into()),
             Err(error) => {
                 how.push(format!("no chain ({error})"));
+                answer.no_chain = Some(error.to_string());
                 None
             }
             Ok(chain) => Some(chain),
@@ -253,7 +272,7 @@ impl<'a> Laws<'a> {
         }
         answer.layers.participation = Some(Layer {
             lower_bound: best,
-            how: format!("at the spec's loss, the better of: {}", how.join("; ")),
+            how: format!("at {at}, the better of: {}", how.join("; ")),
         });
         answer.assumptions.push(format!(
             "the participation's error is drawn as {kind}, independently, at every decision and in Fixed every {} s",
@@ -264,24 +283,22 @@ impl<'a> Laws<'a> {
     }
 
     fn with_chain(&self, answer: &mut Answer, own: ClosedLoop, bounds: &[f64]) {
-        // Two steps of the chain last a period and a tick at least.
-        let seconds =
-            |steps: usize| (steps / 2) as f64 * self.tick_s * f64::from(self.period_ticks + 1);
-        answer.over_time = bounds
-            .iter()
-            .enumerate()
-            .skip(2)
-            .step_by(2)
-            .map(|(n, bound)| [seconds(n - 2), *bound])
-            .collect();
+        // The bound over T is that of the steps that may begin in T.
+        let over = |steps: usize| {
+            let (ticks, used) = own.pace.covered(steps as u32)?;
+            let bound = bounds.get(used as usize)?;
+            Some((used as usize, [self.tick_s * f64::from(ticks), *bound]))
+        };
+        let times =
+            (0..bounds.len()).filter_map(|steps| over(steps).filter(|(used, _)| *used == steps));
+        answer.over_time = times.map(|(_, point)| point).collect();
         answer.cut = own.cut.map(|cut| {
-            // The bound over T is that of `steps_in` T: two steps are spent on its ends.
-            let whole = (cut.steps.max(2) - 2) as usize / 2 * 2;
+            let whole = over(cut.steps as usize).map(|(_, point)| point);
             Cut {
                 steps: cut.steps,
                 nodes: cut.nodes,
-                until_s: seconds(whole),
-                lower_bound: bounds.get(whole + 2).copied().filter(|_| cut.steps >= 2),
+                until_s: whole.map_or(0.0, |[until_s, _]| until_s),
+                lower_bound: whole.map(|[_, bound]| bound),
             }
         });
         answer.states = own.chain.states();

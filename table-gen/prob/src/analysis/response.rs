@@ -118,6 +118,10 @@ pub(super) fn of_response(spec: &Spec, question: &Question, proofs: Vec<BandProo
         seconds_below_49_5: None,
         below: None,
         chain: None,
+        no_chain: Some(
+            "a response is on at all times, and its errors are bounded by a union of draws"
+                .to_owned(),
+        ),
         steps: 0,
     }
 }

@@ -17,13 +17,19 @@ pub(super) fn covered(table: &TableView<'_>, spec: &Spec) -> Result<(), ClosedLo
     if header.always_on {
         return unsupported("a response", "its errors are bounded by a union of draws");
     }
-    if header.stay || spec.requirements.stay {
-        return unsupported("a table with Hold", "tables without (stay = false) are");
-    }
-    if header.delay_ticks > 0 || spec.uncertainty.actuation_delay_s.most_s() > 0.0 {
+    if header.stay != spec.requirements.stay {
         return unsupported(
-            "commands that act late",
-            "uncertainty.actuation_delay_s = 0 is",
+            "a table with Hold for a spec without, or the other way round",
+            "requirements.stay as the table has it is",
+        );
+    }
+    let most_ms = spec.uncertainty.actuation_delay_s.most_s() * 1e3 - 1e-6;
+    if most_ms > f64::from(u32::from(header.tick_ms) * u32::from(header.period_ticks))
+        || header.delay_ticks > header.period_ticks
+    {
+        return unsupported(
+            "commands that act more than a period late",
+            "uncertainty.actuation_delay_s of at most sampling.period_s, or a range below it, is",
         );
     }
     if spec.uncertainty.own_clocks {

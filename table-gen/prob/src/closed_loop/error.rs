@@ -30,3 +30,13 @@ pub enum ClosedLoopError {
     #[error("interrupted")]
     Interrupted,
 }
+
+impl ClosedLoopError {
+    /// The sets of the chain do not hold those of the event.
+    pub(super) fn too_wide() -> Self {
+        Self::Unsupported {
+            what: "an initial set that is far wider than the sets of the chain".to_owned(),
+            remedy: "a smaller uncertainty.initial or wider bins are",
+        }
+    }
+}

@@ -10,6 +10,9 @@ use crate::participation::Bin;
 impl Loop<'_> {
     /// The decided states of a node.
     pub(super) fn expand(&self, key: &Key) -> Expanded {
+        if let Some(ahead) = &self.ahead {
+            return self.carried_out(key, ahead);
+        }
         let ball = self.cover.ball(key.cell, key.left);
         let state = key.state();
         let mut out = Expanded {
@@ -26,6 +29,7 @@ impl Loop<'_> {
                 Some(Failure::Containment) => out.failures.containment += 1,
                 Some(Failure::Uncovered) => out.failures.uncovered += 1,
                 Some(Failure::Late) => out.failures.late += 1,
+                Some(Failure::Left) => out.failures.left += 1,
                 None => {
                     let fits = |(_, ends): &&(f64, Ends)| *ends == Ends::Failed;
                     out.failures.not_fitting += decided.branches.iter().filter(fits).count();
@@ -112,6 +116,7 @@ impl Loop<'_> {
                         left: false,
                         age,
                         cell,
+                        before: None,
                     }])
                 }
                 None => Ends::Failed,
@@ -133,6 +138,7 @@ impl Loop<'_> {
             left,
             age: 0,
             cell,
+            before: None,
         };
         for bin in bins {
             let net = self.net(bin.delivered);
@@ -168,7 +174,7 @@ impl Loop<'_> {
 }
 
 /// Adds a branch; one that ends as the last does is added to it, rounded down.
-fn push(out: &mut Branches, probability: f64, ends: Ends) {
+pub(super) fn push(out: &mut Branches, probability: f64, ends: Ends) {
     match out.last_mut() {
         Some((sum, last)) if *last == ends => {
             let whole = *sum + probability;

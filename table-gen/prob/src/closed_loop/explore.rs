@@ -17,10 +17,12 @@ impl Loop<'_> {
     pub(super) fn explore(
         &self,
         start: &Start,
-        steps: u32,
+        horizon_ticks: u32,
         settings: &Settings,
         go_on: &dyn Fn(usize, usize) -> bool,
     ) -> Result<ClosedLoop, ClosedLoopError> {
+        let pace = self.pace();
+        let steps = pace.steps_in(horizon_ticks);
         let mut known = Known::default();
         let mut initial = Vec::new();
         for ends in &start.ends {
@@ -51,6 +53,7 @@ impl Loop<'_> {
                 failures.containment += node.failures.containment;
                 failures.uncovered += node.failures.uncovered;
                 failures.late += node.failures.late;
+                failures.left += node.failures.left;
                 failures.not_fitting += node.failures.not_fitting;
                 for decided in node.decided {
                     seconds.push(seconds_of(decided.ticks_below, self.tick_s));
@@ -93,6 +96,7 @@ impl Loop<'_> {
         Ok(ClosedLoop {
             chain,
             steps,
+            pace,
             nodes: known.keys.len(),
             cut,
             failures,

@@ -13,6 +13,9 @@
 //! bin of the draw; its set holds the decided states of all nodes in which the bin may end. Which
 //! of them is an adversary's choice.
 //!
+//! Where there is Hold, or commands act late, a node is what was decided, and the set in which it
+//! begins to act ([`ahead`]): it has one decided state.
+//!
 //! # Steps
 //! A step is a period, but in Fixed it ends at the tick at which f leaves I2. After such a step
 //! comes a whole period of a law. So n steps last at least `floor(n/2) (period + 1)` ticks, and at
@@ -28,6 +31,9 @@
 //! fails at its first step. Its value is 1 with no step to go and 0 with any, which is a lower
 //! bound whatever comes after it. The chain stays a chain, and its bound a bound for every horizon.
 
+mod ahead;
+mod changeover;
+mod commanded;
 mod covered;
 mod error;
 mod event;
@@ -35,6 +41,8 @@ mod expand;
 mod explore;
 mod known;
 mod offers;
+mod pace;
+mod powers;
 
 use std::collections::HashSet;
 
@@ -54,12 +62,17 @@ use crate::modes::Modes;
 pub use crate::modes::ModesError;
 use crate::participation::{Bin, Drawn, Participation};
 use crate::reward::Reward;
+use ahead::Ahead;
 pub use error::ClosedLoopError;
 pub(crate) use offers::Offered;
 pub use offers::Place;
+pub use pace::Pace;
 
 /// Below this frequency seconds are counted \[Hz\]: 49.5 Hz, as a deviation.
 pub const BELOW_HZ: f64 = -0.5;
+
+/// Most cells into which the states at the first decision are cut.
+const FIRST_CELLS_MAX: usize = 20_000;
 
 /// How finely the chain is built.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -81,6 +94,8 @@ pub struct Failures {
     pub uncovered: usize,
     /// I2 is not reached in time.
     pub late: usize,
+    /// f may leave I2, or the states that Hold covers, while Hold is in force.
+    pub left: usize,
     /// Branches whose image did not fit the cover.
     pub not_fitting: usize,
 }
@@ -101,6 +116,8 @@ pub struct ClosedLoop {
     pub chain: Chain,
     /// Steps for the horizon.
     pub steps: u32,
+    /// How long they last.
+    pub pace: Pace,
     /// Nodes: pairs of what the firmware remembers and a set.
     pub nodes: usize,
     /// What was not followed; nothing where every node was.
@@ -125,6 +142,9 @@ struct Key {
     /// Ticks since the tick before the band was left; 0 outside an excursion.
     age: u16,
     cell: [i32; STATES],
+    /// Where a decision is kept: what was delivered under the command before \[bins\], if it still
+    /// counts.
+    before: Option<[i32; 2]>,
 }
 
 impl Key {
@@ -144,6 +164,7 @@ enum Failure {
     Containment,
     Uncovered,
     Late,
+    Left,
 }
 
 /// Where a branch may end.
@@ -185,8 +206,11 @@ struct Loop<'a> {
     flights: Flights,
     cover: Cover,
     regions: Regions,
+    /// With Hold, or where commands act late.
+    ahead: Option<Ahead>,
     /// Bins of each level.
     bins: Vec<Vec<Bin>>,
+    bin_gw: f64,
     fleet: Interval,
     loss: Interval,
     ticks: u32,
@@ -195,11 +219,6 @@ struct Loop<'a> {
     settle_ticks: u32,
     /// Whether an excursion can be late within the horizon.
     ages: bool,
-}
-
-/// Steps that may begin in so many ticks.
-pub fn steps_in(ticks: u32, period_ticks: u32) -> u32 {
-    2 * (ticks / (period_ticks + 1)) + 2
 }
 
 /// Builds the chain. `go_on` is told the nodes expanded and known, and may end it.
@@ -213,8 +232,8 @@ pub fn build(
     settings: &Settings,
     go_on: &dyn Fn(usize, usize) -> bool,
 ) -> Result<ClosedLoop, ClosedLoopError> {
-    let (whole, start, steps) = prepared(table, spec, participation, settings)?;
-    whole.explore(&start, steps, settings, go_on)
+    let (whole, start, horizon_ticks) = prepared(table, spec, participation, settings)?;
+    whole.explore(&start, horizon_ticks, settings, go_on)
 }
 
 /// The chain in which the places of `open` offer every level.
@@ -226,11 +245,18 @@ pub(crate) fn offered(
     open: &HashSet<Place>,
     go_on: &dyn Fn(usize, usize) -> bool,
 ) -> Result<Offered, ClosedLoopError> {
-    let (whole, start, steps) = prepared(table, spec, participation, settings)?;
+    let (whole, start, horizon_ticks) = prepared(table, spec, participation, settings)?;
+    if whole.ahead.is_some() {
+        return Err(ClosedLoopError::Unsupported {
+            what: "other levels for a table with Hold, or whose commands act late".to_owned(),
+            remedy: "tables without are (stay = false, uncertainty.actuation_delay_s = 0)",
+        });
+    }
+    let steps = whole.pace().steps_in(horizon_ticks);
     whole.offer(&start.ends, steps, settings, open, go_on)
 }
 
-/// What the chain is made from: the loop, where it begins, and the steps of the horizon.
+/// What the chain is made from: the loop, where it begins, and the ticks of the horizon.
 fn prepared<'a>(
     table: &'a TableView<'a>,
     spec: &Spec,
@@ -268,11 +294,14 @@ fn prepared<'a>(
         .grid
         .width()
         .map(|width| f64::from(width) / f64::from(MICRO));
+    let ahead = Ahead::new(table, spec, &modes, (&a, &b), settings.bin_gw)?;
+    let changeover = ahead.as_ref().and_then(|ahead| ahead.changeover.as_ref());
+    let beside = changeover.map(|changeover| changeover.reach(&modes, plant.fleet));
     let cover = Cover::new(
         &modes,
         &flights,
         ticks,
-        [0.5 * settings.bin_gw, moving],
+        ([0.5 * settings.bin_gw, moving], &beside.unwrap_or_default()),
         width,
     )
     .ok_or(ClosedLoopError::Unsupported {
@@ -293,7 +322,9 @@ fn prepared<'a>(
     let whole = Loop {
         table,
         regions: Regions::new(table, &modes, error),
+        ahead,
         bins: bins.collect(),
+        bin_gw: settings.bin_gw,
         fleet: Interval::point(plant.fleet),
         loss,
         ticks,
@@ -308,10 +339,15 @@ fn prepared<'a>(
         cover,
     };
     let start = whole.start(&modes, (&a, &b), spec, horizon_ticks)?;
-    Ok((whole, start, steps_in(horizon_ticks, ticks)))
+    Ok((whole, start, horizon_ticks))
 }
 
 impl Loop<'_> {
+    /// How long steps last.
+    fn pace(&self) -> Pace {
+        Pace::of(&self.table.header())
+    }
+
     /// Net power under a delivered participation.
     fn net(&self, delivered: Interval) -> NetPower {
         let exact = self.loss.low == self.loss.high;

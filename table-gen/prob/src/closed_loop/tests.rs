@@ -174,7 +174,10 @@ fn the_first_seconds_are_bounded() {
         value::bounds(&built.chain, built.steps)
     };
     let exact = bound(&Participation::Exact, 4.0);
-    assert_eq!(exact.len() as u32, 1 + steps_in(40, 15));
+    assert_eq!(
+        exact.len() as u32,
+        1 + Pace::of(&table.header()).steps_in(40)
+    );
     assert_eq!(exact.last(), Some(&1.0));
     // A small error: few bins, so that the test is quick.
     let kind = Participation::Gaussian {
