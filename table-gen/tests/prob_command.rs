@@ -94,6 +94,21 @@ fn the_spec_says_what_is_drawn_and_a_cut_chain_says_so() {
     assert!(option["states"].as_u64().unwrap() > 10_000 && option["cut"].is_null());
 }
 
+/// Hold, and commands that act a second late: a chain is made (and cut here), with one step a period;
+/// the union has one draw for each, eleven of which begin in ten seconds.
+#[test]
+fn a_table_whose_commands_act_late_has_a_chain() {
+    let asked = ["--participation", "gaussian:0.02", "--horizon-s", "10"];
+    let cut = ["--spec", "gb-bi-delay", "--nodes-max", "10", "--json"];
+    let out = prob("gb-bi-delay.bin", &[&cut[..], &asked].concat());
+    assert_eq!(out.status.code(), Some(0), "{out:?}");
+    let report: serde_json::Value = serde_json::from_slice(&out.stdout).unwrap();
+    let bound = report["lower_bound"].as_f64().unwrap();
+    assert!((1.0 - bound - 11.0 * 5.733e-7).abs() < 1e-9, "{bound}");
+    assert_eq!(report["steps"].as_u64(), Some(11));
+    assert!(report["states"].as_u64().unwrap() > 100);
+}
+
 #[test]
 fn bad_input_is_named() {
     let spec = ["--spec", "paper-bi"];

@@ -190,8 +190,8 @@ impl Cover {
     /// there are more than `most`.
     ///
     /// In each block a lattice of every n-th point is taken, n such that half a diagonal of it is
-    /// below the radius: the nearest lattice point of any state then holds it. The hundredth that is
-    /// left is far above the roundings.
+    /// below the radius: the nearest lattice point of any state then holds it. The hundredth that
+    /// is left is far above the roundings.
     pub(crate) fn cells(&self, ball: &Ball, left: bool, most: usize) -> Option<Vec<[i32; STATES]>> {
         if let Some(cell) = self.cell(ball, left) {
             return Some(vec![cell]);

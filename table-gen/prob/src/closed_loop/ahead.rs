@@ -3,8 +3,8 @@
 //! # Late commands
 //! A command of the tick t begins to act at t + δ. The sets of the chain are those of the real
 //! states *there*, y(t) = x(t + δ): from y(t) on the grid flies under the new command alone (after
-//! its changeover, if there is one), and the next decision's y is at the end of that flight. So late
-//! commands change nothing in how sets fly.
+//! its changeover, if there is one), and the next decision's y is at the end of that flight. So
+//! late commands change nothing in how sets fly.
 //!
 //! They change what is decided on. The device predicts ξ(t) from its estimate at t and from the
 //! commands under way. In [t, t + δ) the fleet gives d(s) beside what was commanded, and the loss
@@ -16,8 +16,8 @@
 //!
 //! with the error of [`verify::prediction_error`], for estimates that are not too large. δ is at
 //! most a period, so all of [t, t + δ) is under *one* draw, the one before: its bin bounds d. In
-//! Fixed the phase is examined every tick, and the window may begin under one draw and end under the
-//! next: d is then in the hull of both.
+//! Fixed the phase is examined every tick, and the window may begin under one draw and end under
+//! the next: d is then in the hull of both.
 //!
 //! What the device decides is therefore asked where a branch ends: there the set and the bin are
 //! known, and no pending command needs to be kept. The nodes of such a chain hold the decision that

@@ -10,11 +10,11 @@
 //! ∫ θ(s) (p⁻ - p) exp(A (τ - s)) b ds, over [0, c]
 //! ```
 //!
-//! to the state at the period's end. θ is not negative, so this is the impulse `j = (p⁻ - p) ∫ θ ds`
-//! times a vector of the convex hull of exp(A σ) b, σ in [τ - c, τ]; and j is in the hull of 0 and
-//! `c (p⁻ - p)`. The hull of the vectors is enclosed axis by axis, in the plant's modes. The range
-//! of j is cut into pieces no wider than half a bin of the fleet's power held for the period: each
-//! piece has one successor in the cover, and which piece it is is the adversary's choice.
+//! to the state at the period's end. θ is not negative, so this is an impulse, `j = (p⁻ - p) ∫ θ
+//! ds`, times a vector of the convex hull of exp(A σ) b, σ in [τ - c, τ]; and j is in the hull of 0
+//! and `c (p⁻ - p)`. The hull of the vectors is enclosed axis by axis, in the plant's modes. The
+//! range of j is cut into pieces no wider than half a bin of the fleet's power held for the period:
+//! each piece has one successor in the cover, and which piece it is is the adversary's choice.
 //!
 //! f is the same way within j times the hull of the frequency's row of exp(A σ) b, σ in [0, τ],
 //! beside what it is under p.

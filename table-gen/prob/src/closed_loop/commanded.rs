@@ -103,9 +103,9 @@ impl Loop<'_> {
     /// adds to f at most.
     ///
     /// The varying mixture of old and new is the new one and an impulse. It is also a power that
-    /// moves within the hull of both, which says more in the first ticks: little has come of it yet.
-    /// Where f's answer to an impulse is not negative, a power that moves within an interval moves
-    /// f no farther than one that is held anywhere in it.
+    /// moves within the hull of both, which says more in the first ticks: little has come of it
+    /// yet. Where f's answer to an impulse is not negative, a power that moves within an interval
+    /// moves f no farther than one that is held anywhere in it.
     pub(super) fn frequencies(
         &self,
         ball: &Ball,
