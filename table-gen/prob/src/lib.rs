@@ -29,9 +29,9 @@
 //! | a held input: where the state is at each tick, and f in between | `flight` |
 //! | overlapping cells whose sets are closed under a step | `cover` |
 //! | the firmware's decisions on a set | `decisions` |
-//! | nodes and branches, from the event on | `closed_loop` |
+//! | nodes and branches, from the event on; Hold, and commands that act late | `closed_loop` |
 //! | other levels for a table, chosen on these sets | `maximise` |
-//! | single runs of the same process, beside the bound | `sampled` |
+//! | single runs of the same process, beside the bound | `sampled`, `under_way`, `kept` |
 //!
 //! `analysis` puts the layers together.
 //!
