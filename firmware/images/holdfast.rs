@@ -14,11 +14,12 @@ use cortex_m_rt::entry;
 use firmware::board::{Parts, Runner};
 use firmware::charger::MeterFacts;
 use firmware::frequency::meter;
+use firmware::retained::Care;
 use product::desk::{CONTAINER_MAX, Desk, judge};
 use service::device::Device;
 use settings::config::{Board, Judged};
-use settings::store::Store;
-use settings::values::{Build, Values};
+use settings::store::{Store, StoreError};
+use settings::values::Build;
 use update::class::DeviceClass;
 use update::key::PublicKey;
 use update::slots::Slots;
@@ -89,16 +90,22 @@ fn main() -> ! {
 fn charge() -> Option<()> {
     let mut started = board::start()?;
     let (settings_flash, slot_flash) = started.places;
-    let store = Store::open(settings_flash, board::flash::SETTINGS, BUILD);
-    let device = store.ok().map(Device::new);
-    // Without a memory nobody knows what the cable bears.
-    let values = device
-        .as_ref()
-        .map_or_else(|| Values::nothing_known(BUILD), |device| *device.in_force());
+    let store = match started.care {
+        Care::None => Store::open(settings_flash, board::flash::SETTINGS, BUILD),
+        Care::Guarded | Care::Deaf => Err(StoreError::NotOpened),
+    };
+    // Without a memory nobody knows what the cable bears: nothing is offered.
+    let device = Device::opened(store, BUILD);
+    let values = *device.in_force();
+    let device = (started.care != Care::Deaf).then_some(device);
     let source = Judged::new(meter::on(&mut started.hardware)?, &values);
-    let judge = judge(built::TRUSTED, CLASS, &values, MeterFacts::of(&source));
-    let slots = Slots::start(slot_flash, board::flash::SLOTS?, judge);
-    let table = slots.running().map_or_else(
+    let slots = if started.care == Care::None {
+        let judge = judge(built::TRUSTED, CLASS, &values, MeterFacts::of(&source));
+        Some(Slots::start(slot_flash, board::flash::SLOTS?, judge))
+    } else {
+        None
+    };
+    let table = slots.as_ref().and_then(Slots::running).map_or_else(
         || firmware::flash::image(table_region::bytes()),
         |running| board::flash::table(running.table.clone()),
     );

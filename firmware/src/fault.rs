@@ -40,9 +40,12 @@ impl Faults {
     pub const CLOCK: Self = Self(1 << 13);
     /// The last run was stopped by a panic, a hard fault or a crystal that failed.
     pub const STOPPED: Self = Self(1 << 14);
+    /// Start after start did not come to a run ([`crate::retained`]). This one goes without
+    /// settings, slots and orders, and offers nothing.
+    pub const GUARDED: Self = Self(1 << 15);
 
     /// Every fault with its name, in the order of the bits.
-    pub const NAMES: [(Self, &'static str); 15] = [
+    pub const NAMES: [(Self, &'static str); 16] = [
         (Self::BUS, "bus"),
         (Self::NO_SIGNAL, "no-signal"),
         (Self::STALE, "stale"),
@@ -58,6 +61,7 @@ impl Faults {
         (Self::MISFIT, "misfit"),
         (Self::CLOCK, "clock"),
         (Self::STOPPED, "stopped"),
+        (Self::GUARDED, "guarded"),
     ];
 
     /// The bits, as telemetry carries them.

@@ -253,5 +253,6 @@ same! {
 const _: () = assert!(firmware::fault::Mode::ALL.len() == 8);
 const _: () = assert!(firmware::phase::Phase::ALL.len() == 7);
 const _: () = assert!(Misfits::NAMES.len() == 6);
-// All but DISPATCH, CLOCK and STOPPED: the provider drives no hardware and has no clock.
-const _: () = assert!(Faults::NAMES.len() == 12 + 3);
+// All but DISPATCH, CLOCK, STOPPED and GUARDED: the provider drives no hardware, has no clock and
+// starts nothing.
+const _: () = assert!(Faults::NAMES.len() == 12 + 4);

@@ -33,7 +33,7 @@ use firmware::dispatch::car::{CarSense, CarState};
 use firmware::dispatch::pilot::PILOT_HZ;
 use firmware::fault::{Faults, ResetCause};
 use firmware::frequency::captures::Captures;
-use firmware::retained::{self, Ending};
+use firmware::retained::{self, Care, Ending};
 use stm32f4xx_hal::gpio::{Output, PA0, PA1, PA4, PA5, PA6, PA7, PA8, PB0};
 use stm32f4xx_hal::pac::{self, ADC_COMMON, ADC1, SPI1, TIM1, TIM2, TIM5};
 use stm32f4xx_hal::prelude::*;
@@ -76,6 +76,8 @@ pub(crate) struct Started {
     pub(crate) cause: ResetCause,
     /// What is wrong with the board in this run.
     pub(crate) faults: Faults,
+    /// What this start dares, after those before it.
+    pub(crate) care: Care,
     /// Starts before this one since the supply came; wraps.
     pub(crate) starts: u8,
     /// A number of this chip, for its place in the fleet.
@@ -89,11 +91,14 @@ pub(crate) struct Started {
 pub(crate) fn start() -> Option<Started> {
     let peripherals = pac::Peripherals::take()?;
     // Before the clock: a crystal that does not start must not hang the charger for ever.
-    let watchdog = dog::Dog::start(peripherals.IWDG);
+    let watchdog = dog::start(peripherals.IWDG);
     let cause = reset_cause(&peripherals.RCC);
     let mut kept = ending::Backup::open(&peripherals.RCC, &peripherals.PWR);
-    let last = retained::start(&mut kept);
+    let last = retained::start(&mut kept, cause);
     let mut faults = Faults::NONE;
+    if last.care() != Care::None {
+        faults.insert(Faults::GUARDED);
+    }
     if last.ending != Ending::Unnoted {
         faults.insert(Faults::STOPPED);
     }
@@ -124,9 +129,10 @@ pub(crate) fn start() -> Option<Started> {
             car: Some((peripherals.ADC1, peripherals.ADC_COMMON, port_a.pa1)),
         },
         board: Lines { timer, line },
-        watchdog,
+        watchdog: watchdog.of_run(kept),
         cause,
         faults,
+        care: last.care(),
         starts: last.starts,
         serial: serial_number(),
         places: flash::places(peripherals.FLASH),

@@ -12,7 +12,13 @@
 //!
 //! # What goes wrong
 //! Nothing here is in the way of a tick: it sets limits before one, and takes what is left of its
-//! time after. Without a memory that can be opened there is no service, and nothing is offered.
+//! time after. Without a memory that can be opened nothing is offered, and no order is taken: the
+//! charger says who and how it is.
+//!
+//! # Guarded
+//! After starts that did not come to a run ([`firmware::retained`]) there is neither memory nor
+//! slot, and after more of them no service: what comes on the line is let go by. Such a run ends by
+//! itself after [`GUARDED_MS`], so that the next start tries everything again.
 
 use embedded_storage::nor_flash::MultiwriteNorFlash;
 use firmware::board::Attendant;
@@ -34,6 +40,10 @@ use update::wire::{Inbox, Reason, Said, read_step, write_said};
 
 /// Ticks between two times that a charger says by itself who it is: a minute at 100 ms.
 pub const INTRODUCTION_TICKS: u16 = 600;
+/// How long a guarded run lasts \[ms\]: ten minutes. The start after it tries everything: half a
+/// second without a tick if it fails, once in ten minutes, and the contactor is open anyway. A cause
+/// that has gone is found so without anybody's help.
+pub const GUARDED_MS: u32 = 600_000;
 /// Longest container that is taken over the line: any table of a response, and the games' up to
 /// 2,976 bytes. It is collected in memory before it is verified.
 pub const CONTAINER_MAX: usize = 3_072;
@@ -79,7 +89,8 @@ struct Around<'b, G, K> {
     frame: Option<Frame>,
     rests: bool,
     idle: bool,
-    slots: Slots<G, K>,
+    /// `None` in a guarded run.
+    slots: Option<Slots<G, K>>,
     inbox: Inbox<'b>,
 }
 
@@ -110,8 +121,9 @@ impl<G: Mapped, K: Verify> Facts for Around<'_, G, K> {
 
     fn update(&mut self, sent: &[u8], answer: &mut [u8]) -> Option<usize> {
         let may_stand_still = self.may_write();
+        let slots = self.slots.as_mut()?;
         let said = match read_step(sent) {
-            Some(step) => self.inbox.step(&mut self.slots, &step, may_stand_still),
+            Some(step) => self.inbox.step(slots, &step, may_stand_still),
             None => Said::Refused(Reason::MALFORMED),
         };
         write_said(&said, answer)
@@ -126,14 +138,17 @@ pub struct Desk<'b, F: MultiwriteNorFlash, G, K> {
     trial: Trial,
     /// Ticks until the charger says who it is.
     introduction: u16,
+    /// A guarded run has lasted for its time.
+    is_over: bool,
 }
 
 impl<'b, F: MultiwriteNorFlash, G: Mapped, K: Verify> Desk<'b, F, G, K> {
-    /// A desk of a charger before its first tick. `device` is the memory's service, if it could be
-    /// opened; `table` is what the charger runs; `inbox` is where containers are collected.
+    /// A desk of a charger before its first tick. `device` is the service; `None` lets go by what
+    /// comes. Without `slots` the run is a guarded one. `table` is what the charger runs; `inbox`
+    /// is where containers are collected.
     pub const fn new(
         device: Option<Device<F>>,
-        slots: Slots<G, K>,
+        slots: Option<Slots<G, K>>,
         table: Option<TableId>,
         inbox: &'b mut [u8],
         build: &'static str,
@@ -153,15 +168,20 @@ impl<'b, F: MultiwriteNorFlash, G: Mapped, K: Verify> Desk<'b, F, G, K> {
             },
             trial: Trial::DEFAULT,
             introduction: 0,
+            is_over: false,
         }
     }
 
-    /// Keeps a table on trial once it has run well.
+    /// Keeps a table on trial once it has run well, and sees when a guarded run is over.
     fn watch_trial(&mut self, report: &Report) {
-        let running = self.around.slots.running();
+        let Some(slots) = &mut self.around.slots else {
+            self.is_over = report.now_ms >= GUARDED_MS;
+            return;
+        };
+        let running = slots.running();
         if running.is_some_and(|running| !running.confirmed) && self.trial.tick(report) {
             // Where the flash does not take it the table stays on trial, and runs well once more.
-            let _ = self.around.slots.confirm();
+            let _ = slots.confirm();
             self.trial = Trial::DEFAULT;
         }
     }
@@ -216,6 +236,6 @@ where
     }
 
     fn ends(&self) -> bool {
-        self.device.as_ref().is_some_and(Device::restarts)
+        self.is_over || self.device.as_ref().is_some_and(Device::restarts)
     }
 }

@@ -19,8 +19,8 @@ use embedded_storage::nor_flash::MultiwriteNorFlash;
 use firmware::dispatch::LimitSource;
 use settings::key::Key;
 use settings::orders::{LIMIT_MOST_MA, ORDER_MOST_S, Orders, Override};
-use settings::store::{Origin, Store, StoreError};
-use settings::values::Values;
+use settings::store::{Loaded, Origin, Store, StoreError};
+use settings::values::{Build, Values};
 
 use crate::facts::Facts;
 use crate::frame::{Collector, FRAME_MAX, RECORD_MAX, encode};
@@ -63,7 +63,9 @@ struct Outbox {
 /// The service of a charger.
 #[derive(Debug)]
 pub struct Device<F: MultiwriteNorFlash> {
-    store: Store<F>,
+    /// `Err` without a memory: then nothing is known and no order is taken.
+    store: Result<Store<F>, StoreError>,
+    build: Build,
     /// Those in flash, or what stands for them.
     values: Values,
     /// Those in force.
@@ -85,12 +87,31 @@ pub struct Device<F: MultiwriteNorFlash> {
 
 impl<F: MultiwriteNorFlash> Device<F> {
     /// The service of a charger with this memory.
-    pub fn new(mut store: Store<F>) -> Self {
-        let loaded = store.settings();
-        let key = store.device_key().map(|key| key.map(DeviceKey::new));
-        let ceiling = store.ceiling().ok();
+    pub fn new(store: Store<F>) -> Self {
+        let build = store.build();
+        Self::opened(Ok(store), build)
+    }
+
+    /// The service of a charger whose memory could be opened or not. Without it the charger says
+    /// who it is and how; whatever needs a key or a setting is refused by [`Refusal::Flash`], and
+    /// the values in force are [`Values::nothing_known`].
+    pub fn opened(mut store: Result<Store<F>, StoreError>, build: Build) -> Self {
+        let (loaded, key, ceiling) = match &mut store {
+            Ok(store) => {
+                let key = store.device_key().map(|key| key.map(DeviceKey::new));
+                (store.settings(), key, store.ceiling().ok())
+            }
+            Err(error) => {
+                let loaded = Loaded {
+                    values: Values::nothing_known(build),
+                    origin: Origin::Unreadable(*error),
+                };
+                (loaded, Err(*error), None)
+            }
+        };
         Self {
             store,
+            build,
             values: loaded.values,
             in_force: loaded.values,
             origin: loaded.origin,
@@ -150,7 +171,7 @@ impl<F: MultiwriteNorFlash> Device<F> {
     /// Sets a block of challenges aside.
     fn set_aside(&mut self) -> Result<(), Refusal> {
         let ceiling = self.ceiling.checked_add(BLOCK).ok_or(Refusal::Flash)?;
-        self.store.write_ceiling(ceiling).map_err(flash)?;
+        self.store()?.write_ceiling(ceiling).map_err(flash)?;
         self.ceiling = ceiling;
         Ok(())
     }
@@ -240,7 +261,7 @@ impl<F: MultiwriteNorFlash> Device<F> {
                     return Err(Refusal::HasKey);
                 }
                 writes(facts.may_write())?;
-                self.store.write_device_key(&key).map_err(flash)?;
+                self.store()?.write_device_key(&key).map_err(flash)?;
                 self.key = Ok(Some(DeviceKey::new(key)));
                 Ok(Answer::Provisioned)
             }
@@ -258,8 +279,8 @@ impl<F: MultiwriteNorFlash> Device<F> {
         Identity {
             build,
             serial: facts.serial(),
-            direction: self.store.build().direction as u8,
-            meter: self.store.build().meter,
+            direction: self.build.direction as u8,
+            meter: self.build.meter,
             table: facts.table(),
             provisioned: !matches!(self.key, Ok(None)),
             settings: match self.origin {
@@ -292,6 +313,10 @@ impl<F: MultiwriteNorFlash> Device<F> {
             count: Key::ALL.len() as u8,
             pairs: Pairs::from_iter(pairs.map(|key| (key.number(), self.values.get(key)))),
         }
+    }
+
+    fn store(&mut self) -> Result<&mut Store<F>, Refusal> {
+        self.store.as_mut().map_err(|error| flash(*error))
     }
 
     fn key(&self) -> Result<Option<DeviceKey>, Refusal> {
@@ -362,10 +387,10 @@ impl<F: MultiwriteNorFlash> Device<F> {
     ) -> Result<(), Refusal> {
         match order {
             Order::Settings(pairs) => {
-                let values = self.values.with(pairs, self.store.build())?;
+                let values = self.values.with(pairs, self.build)?;
                 self.write(values)
             }
-            Order::Defaults => self.write(Values::defaults(self.store.build())),
+            Order::Defaults => self.write(Values::defaults(self.build)),
             Order::Limit { source, ma, for_s } => {
                 let sources = [LimitSource::User, LimitSource::Site, LimitSource::Cable];
                 let source = sources.get(usize::from(*source)).copied();
@@ -393,7 +418,7 @@ impl<F: MultiwriteNorFlash> Device<F> {
             }
             Order::NewKey { masked } => {
                 let new = key.mask(challenge, &DeviceKey::new(*masked));
-                self.store.write_device_key(new.bytes()).map_err(flash)?;
+                self.store()?.write_device_key(new.bytes()).map_err(flash)?;
                 self.key = Ok(Some(new));
                 Ok(())
             }
@@ -406,7 +431,7 @@ impl<F: MultiwriteNorFlash> Device<F> {
 
     /// Writes settings; the limits are in force at once.
     fn write(&mut self, values: Values) -> Result<(), Refusal> {
-        self.store.write_settings(&values).map_err(flash)?;
+        self.store()?.write_settings(&values).map_err(flash)?;
         self.values = values;
         let at_once = AT_ONCE.map(|key| (key.number(), values.get(key)));
         let lowered = LOWERED_AT_ONCE.map(|key| {
@@ -415,7 +440,7 @@ impl<F: MultiwriteNorFlash> Device<F> {
         });
         for changes in [at_once, lowered] {
             // Allowed values that no other depends on: they are always taken.
-            if let Ok(in_force) = self.in_force.with(&changes, self.store.build()) {
+            if let Ok(in_force) = self.in_force.with(&changes, self.build) {
                 self.in_force = in_force;
             }
         }

@@ -284,6 +284,41 @@ fn orders_that_mean_nothing_are_refused() {
     }
 }
 
+/// Without a memory: who and how it is, nothing offered, nothing taken.
+#[test]
+fn without_a_memory_a_charger_answers_and_takes_nothing() {
+    let mut bench = Bench::new();
+    bench.provision();
+    bench.without_memory();
+    let Answer::Identity(who) = bench.ask(&Ask::Identity) else {
+        panic!("no identity");
+    };
+    assert_eq!((who.settings, who.provisioned), (2, true));
+    let Answer::Status(status) = bench.ask(&Ask::Status) else {
+        panic!("no status");
+    };
+    assert_eq!(status.limits_ma.iter().min(), Some(&0));
+    let key = *KEY.bytes();
+    let order = [1, 2, 3];
+    let mac = [0; 32];
+    let asks = [
+        Ask::Challenge,
+        Ask::Provision { key },
+        Ask::Order {
+            challenge: 0,
+            order: &order,
+            mac,
+        },
+    ];
+    for ask in asks {
+        bench.wait(GAP_MS);
+        assert_eq!(bench.ask(&ask), Answer::Refused(Refusal::Flash), "{ask:?}");
+    }
+    assert_eq!(bench.device.in_force().borne_ma(), 0);
+    bench.restart();
+    assert!(bench.order(&limit(6_000)));
+}
+
 #[test]
 fn the_owner_and_the_restart() {
     let mut bench = Bench::new();

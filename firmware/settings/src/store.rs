@@ -44,6 +44,8 @@ pub enum StoreError {
     NotWritten,
     /// The settings that were read are not allowed.
     Record(RecordError),
+    /// Nobody has looked: the start left it out.
+    NotOpened,
 }
 
 /// Where a charger's settings come from.

@@ -37,7 +37,7 @@ const HYPOTHESES: [(&str, &[Faults]); 5] = [
     ("set-point taken by the hardware", &[Faults::DISPATCH]),
     (
         "meter, tick, direction and power as the proof has them",
-        &[Faults::MISFIT],
+        &[Faults::MISFIT, Faults::GUARDED],
     ),
 ];
 

@@ -109,8 +109,9 @@ class Run:
         offers = self.offers(start, end)
         self.check(f"{what}: nothing is offered", set(offers) <= {0}, offers[:8])
 
-    def sound(self, resets=1, late_ok=()):
-        """What holds in every scenario. `late_ok`: when a tick may be late, or its frame missing."""
+    def sound(self, resets=1, late_ok=(), dead=0):
+        """What holds in every scenario. `late_ok`: when a tick may be late, or its frame missing. `dead`: starts that
+        are stopped before their first tick."""
         self.check("resets", len(self.board.resets) == resets, (resets, len(self.board.resets), self.board.resets))
         who = self.identity()
         self.check("it says who it is", who and who.serial == serial_of(self.board.uid) and who.build, who)
@@ -123,7 +124,7 @@ class Run:
         )
         # A start that the next one follows at once sends nothing.
         starts = [at_s for at_s, _ in self.board.resets]
-        silent = sum(b - a < 0.25 for a, b in zip(starts, starts[1:]))
+        silent = sum(b - a < 0.25 for a, b in zip(starts, starts[1:])) + dead
         self.check("no frame is missing in a run", runs == resets - silent, (runs, resets, silent))
         gaps = [
             (b.now_ms, b.now_ms - a.now_ms & 0xFFFFFFFF) for a, b in zip(self.frames, self.frames[1:])

@@ -15,7 +15,7 @@ import random
 import struct
 
 from elftools.elf.elffile import ELFFile
-from unicorn import UC_ARCH_ARM, UC_HOOK_MEM_WRITE, UC_MODE_MCLASS, UC_MODE_THUMB, Uc, UcError
+from unicorn import UC_ARCH_ARM, UC_HOOK_CODE, UC_HOOK_MEM_READ, UC_HOOK_MEM_WRITE, UC_MODE_MCLASS, UC_MODE_THUMB, Uc, UcError
 from unicorn.arm_const import UC_ARM_REG_LR, UC_ARM_REG_PC, UC_ARM_REG_SP, UC_ARM_REG_XPSR, UC_CPU_ARM_CORTEX_M4
 
 FLASH, FLASH_LEN = 0x0800_0000, 0x10_0000
@@ -68,7 +68,8 @@ class Board:
         self.flash = bytearray(b"\xff" * FLASH_LEN)
         file = ELFFile(open(elf, "rb"))
         # The variables' end: what lies above it is stack.
-        self.variables_end = file.get_section_by_name(".symtab").get_symbol_by_name("__euninit")[0]["st_value"]
+        self.symbols = file.get_section_by_name(".symtab")
+        self.variables_end = self.symbols.get_symbol_by_name("__euninit")[0]["st_value"]
         for segment in file.iter_segments():
             if segment["p_type"] == "PT_LOAD" and segment["p_filesz"]:
                 at = segment["p_paddr"] - FLASH
@@ -91,6 +92,8 @@ class Board:
         self.steps, self.cut_after, self.dice = [], None, random.Random(16)
         self.events = []
         self.order = []
+        # What stops the program where it comes to: (hook, first address, last one, how).
+        self.trap = None
         self.power_up(POWER_ON)
 
     # -- start and stop
@@ -131,6 +134,7 @@ class Board:
         uc.mmio_map(BUS, 0x80000, self.read, None, self.write, None)
         uc.mmio_map(BITS, 0x1000000, self.read_bit, None, self.write_bit, None)
         uc.hook_add(UC_HOOK_MEM_WRITE, self.program, None, FLASH, FLASH + FLASH_LEN - 1)
+        self.set_trap()
         sp, self.pc = struct.unpack("<II", uc.mem_read(FLASH, 8))
         uc.reg_write(UC_ARM_REG_SP, sp)
         self.see_outputs()
@@ -173,6 +177,35 @@ class Board:
         """The same at an address, from within an event."""
         self.jumped = address
         self.uc.emu_stop()
+
+    def address(self, name):
+        """Address of the function with this in its mangled name, which must be one."""
+        found = {s["st_value"] & ~1 for s in self.symbols.iter_symbols() if name in s.name and s["st_value"]}
+        if len(found) != 1:
+            raise LookupError(f"{len(found)} functions are called {name}")
+        return found.pop()
+
+    def stops_reading(self, start, length, how):
+        """From the next start on the program is stopped where it reads this part of the flash."""
+        self.trap = (UC_HOOK_MEM_READ, FLASH + start, FLASH + start + length - 1, how)
+
+    def stops_calling(self, name, how):
+        """From the next start on the program is stopped where it calls this function."""
+        self.trap = (UC_HOOK_CODE, self.address(name), self.address(name), how)
+
+    def set_trap(self):
+        if self.trap:
+            hook, first, last, how = self.trap
+            self.uc.hook_add(hook, self.trapped, how, first, last)
+
+    def trapped(self, *seen):
+        """By a panic, by a fault of the bus, or for ever."""
+        how = seen[-1]
+        if how == "fault":
+            self.pending = HARD_FAULT
+            self.uc.emu_stop()
+        else:
+            self.jump(HANG if how == "hang" else self.address("rust_begin_unwind"))
 
     def enter(self, number):
         """Starts an exception. None of them comes back in these programs."""

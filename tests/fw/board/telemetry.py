@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 FAULTS = (
     "bus no-signal stale stuck out-of-range implausible table-rejected outside-domain overrun clock-jump restarted "
-    "dispatch misfit clock stopped"
+    "dispatch misfit clock stopped guarded"
 ).split()
 MISFITS = "meter-error meter-lag tick direction power pace".split()
 MODES = "warm-up table droop-outside droop-no-table hold safe release droop-misfit".split()

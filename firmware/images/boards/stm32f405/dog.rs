@@ -3,7 +3,10 @@
 //! Its time can be changed while it runs, which the flash needs; it cannot be stopped.
 
 use firmware::charger::Watchdog;
+use firmware::retained::Proof;
 use stm32f4xx_hal::pac::{IWDG, iwdg::RegisterBlock};
+
+use super::ending::Backup;
 
 /// Longest time without a completed tick \[ms\].
 pub(super) const USUAL_MS: u16 = 400;
@@ -23,21 +26,36 @@ const COUNTS_MAX: u16 = 4_096;
 const TURNS: u32 = 20_000;
 
 /// The watchdog, started.
-pub(crate) struct Dog(());
+pub(super) struct Running(());
 
-impl Dog {
-    /// Starts the watchdog.
-    pub(super) fn start(_watchdog: IWDG) -> Self {
-        key(START);
-        // At first it has 512 ms, whatever becomes of this.
-        let _ = allow(USUAL_MS);
-        Self(())
+/// Starts the watchdog.
+pub(super) fn start(_watchdog: IWDG) -> Running {
+    key(START);
+    // At first it has 512 ms, whatever becomes of this.
+    let _ = allow(USUAL_MS);
+    Running(())
+}
+
+impl Running {
+    /// The watchdog of a start that has yet to come to a run, which is noted in the memory.
+    pub(super) const fn of_run(self, kept: Backup) -> Dog {
+        Dog {
+            kept,
+            proof: Proof::NEW,
+        }
     }
+}
+
+/// The watchdog of a run: fed by completed ticks, which are the run's proof.
+pub(crate) struct Dog {
+    kept: Backup,
+    proof: Proof,
 }
 
 impl Watchdog for Dog {
     fn feed(&mut self) {
         feed();
+        self.proof.tick(&mut self.kept);
     }
 }
 

@@ -6,7 +6,7 @@ use service::facts::Facts;
 use service::frame::{Collector, FRAME_MAX, RECORD_MAX, encode};
 use service::message::{Answer, Ask, ORDER_MAX, Order, read_answer, write_ask, write_order};
 use service::seal::{Challenge, DeviceKey, MAC_LEN};
-use settings::store::Store;
+use settings::store::{Store, StoreError};
 use settings::testing::{Cells, Memory, RANGE, blank};
 use settings::values::Build;
 
@@ -78,6 +78,11 @@ impl Bench {
     /// Whether the flash may be written from now on.
     pub(crate) fn may_write(&mut self, may_write: bool) {
         self.around.may_write = may_write;
+    }
+
+    /// The charger goes on without a memory.
+    pub(crate) fn without_memory(&mut self) {
+        self.device = Device::opened(Err(StoreError::NotOpened), Build::REFERENCE);
     }
 
     /// Ticks for so long.

@@ -326,7 +326,7 @@ fn play<D: Dispatch + Limited>(
     let mut collected = [0; CONTAINER_MAX];
     let mut desk = Desk::new(
         Some(device),
-        slots,
+        Some(slots),
         runner.table(),
         &mut collected,
         image.name,
