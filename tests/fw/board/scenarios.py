@@ -3,7 +3,7 @@
 import struct
 import zlib
 
-from checks import LIMIT_MA, OFF_S, Run, delay_ms, full, offered, power_w, serial_of, states, threshold_of, uid_of
+from checks import LIMIT_MA, OFF_S, SPAN_W, Run, delay_ms, full, offered, power_w, serial_of, states, threshold_of, uid_of
 from mains import Chip, Grid, Mains
 from service import RESTART, Tool, limit, override, settings
 from telemetry import Reader, fields
@@ -129,10 +129,12 @@ def close_loop(run, grid, until_s):
             grid.participation = run.frames[-1].participation_ppm * 1e-6
 
 
-def event(images, image, fleet_gw, lowest_hz, band, settled_s, given):
+def event(images, image, fleet_gw, lowest_hz, band, settled_s, given, by_chip=False):
     """A loss of 2 GW in closed loop, to its end: the bounds of docs/guarantees.md, quiet, and back again."""
     grid = Grid(fleet_gw, 2.0, 63.0, 103.0)
-    run = Run(image, Mains(grid.hz), uid=soon(image))
+    mains, still = Mains(grid.hz), Mains()
+    chips = (Chip(mains), Chip(still)) if by_chip else (None, None)
+    run = Run(image, mains, uid=soon(image, mains=still, chip=chips[1]), chip=chips[0])
     close_loop(run, grid, 140.0)
     lowest = min(f for _, f in grid.trace)
     run.check(f"f >= {lowest_hz} Hz", lowest >= lowest_hz, lowest)
@@ -180,6 +182,31 @@ def event_bi(images):
     stage = [power_w(line) for _, line in states(run.board.pilot, 0.0, 60.0)]
     run.check("no power before the delay is over", set(stage) == {0}, stage)
     return run
+
+
+def event_bi_chip(images):
+    """The same by the metering chip: its own bounds, and bits lost on its bus, for which what stood stays."""
+    def given(run, start, end):
+        return follows(run, start, end, power_w, lambda f: f.set_point[1])
+
+    # gb-bi-ade7953 in docs/guarantees.md.
+    run, _ = event(images, images.bi_chip, 1.4, -0.4998, (-0.32, 0.1), 11.2, given, by_chip=True)
+    stage = [power_w(line) for _, line in states(run.board.pilot, 0.0, 60.0)]
+    run.check("no power before the delay is over", set(stage) == {0}, stage)
+    fed = [f.set_point for f in run.between(63.0, 103.0) if f.set_point[0] == "W" and f.set_point[1] < 0]
+    run.check("it fed the grid", len(fed) > 10, len(fed))
+    at = run.board.us * 1e-6
+    run.board.chip.flip = 1 << 9
+    run.to(at + 4.0)
+    bad = run.between(at + 0.15, at + 4.0)
+    run.check("a lost bit is the bus's fault", bad and all("bus" in f.faults for f in bad), bad[:1])
+    run.check("held, then safe", bad and (bad[0].mode, bad[-1].mode) == ("hold", "safe"), bad[-1:])
+    run.check("it charges on meanwhile", {f.set_point for f in bad} == {("W", SPAN_W)}, {f.set_point for f in bad})
+    run.board.chip.flip = 0
+    run.to(at + 8.0)
+    good = run.between(at + 6.0, at + 8.0)
+    run.check("and is over with it", good and all(not f.faults and f.mode == "table" for f in good), good[:1])
+    return run.sound()
 
 
 def watchdog_in_event(images):
@@ -672,7 +699,7 @@ def restart_loop_deaf(images):
 
 SCENARIOS = {
     "start": start, "no-car": no_car, "no-mains": no_mains, "mains-gone": mains_gone, "dead-crystal": dead_crystal,
-    "crystal-fails": crystal_fails, "stopped": stopped, "event": event_uni, "event-bidirectional": event_bi,
+    "crystal-fails": crystal_fails, "stopped": stopped, "event": event_uni, "event-bidirectional": event_bi, "event-bidirectional-ade7953": event_bi_chip,
     "watchdog-in-event": watchdog_in_event, "phase-step": phase_step, "phase-step-ade7953": phase_step_chip,
     "exact-50": exact, "jitter": jitter, "misfit": misfit, "ade7953": chip, "limits": limits,
     "in-an-event": in_an_event, "settings-stay": settings_stay, "settings-full": settings_full, "update": update,
