@@ -41,8 +41,8 @@ use update::wire::{Inbox, Reason, Said, read_step, write_said};
 /// Ticks between two times that a charger says by itself who it is: a minute at 100 ms.
 pub const INTRODUCTION_TICKS: u16 = 600;
 /// How long a guarded run lasts \[ms\]: ten minutes. The start after it tries everything: half a
-/// second without a tick if it fails, once in ten minutes, and the contactor is open anyway. A cause
-/// that has gone is found so without anybody's help.
+/// second without a tick if it fails, once in ten minutes, and the contactor is open anyway. So a
+/// cause that has gone needs nobody's help.
 pub const GUARDED_MS: u32 = 600_000;
 /// Longest container that is taken over the line: any table of a response, and the games' up to
 /// 2,976 bytes. It is collected in memory before it is verified.
