@@ -18,7 +18,7 @@ use update::class::DeviceClass;
 use update::container::{Header, Validity};
 use update::key::DEVELOPMENT_SEED;
 
-use crate::costs::{self, CostError, Figures};
+use crate::figures::{CostError, Figures, compiler};
 use crate::images::{self, ImageError, TARGET};
 use crate::root;
 use crate::table_fit::Built;
@@ -197,7 +197,7 @@ fn stacks(folder: &Path, bless: bool) -> Result<(), BoardError> {
     let path = folder.join("stacks");
     let text = fs::read_to_string(&path).map_err(io_error(path.display().to_string()))?;
     let mut figures = Figures::default();
-    figures.note(&costs::compiler());
+    figures.note(&compiler());
     for (image, bytes) in text.lines().filter_map(|line| line.split_once(' ')) {
         let name = format!("{image} stack, deepest of all scenarios");
         figures.line(&name, bytes.parse().unwrap_or(u32::MAX), "bytes", None);

@@ -4,175 +4,42 @@
 //! |---|---|---|
 //! | `sizes.txt` | flash and static RAM by section, panics, allocation, float text | ELF files |
 //! | `run.txt` | stack, instructions of a lookup and of a tick | QEMU: paint, timer by `-icount` |
+//! | `lookups.txt` | the dearest lookup of every shipped table: [`crate::lookups`] | QEMU |
 //! | `board.txt` | stack of the product's images: `cargo fw board` | emulated board: paint |
 //! | `c-api.txt` | the same of the C interface: `cargo fw c-api` | C programs, linked and run |
 //!
-//! A figure past its goal fails, but for the misses that the file already states: those are told at
-//! every run. The text itself must be equal as well, as long as compiler and table are those that
-//! the file names; with others a difference is only shown.
+//! What a figure is held against: [`crate::figures`].
 
-use std::fmt::Write as _;
 use std::fs;
-use std::io::{self, Write as _};
+use std::io::Write as _;
 use std::ops::Range;
 use std::path::Path;
 use std::process::{Command, Stdio};
 use std::time::Duration;
 
+use firmware::link::Request;
 use firmware::link::session::{Session, Wires};
-use firmware::link::{Request, Response};
-use firmware::table::{Law, TableView};
 
-use crate::images::{self, BARE, Elf, HOLDFAST, ImageError, PIL, PRODUCTS};
+use crate::figures::{CostError, Figures, compiler, io_error};
+use crate::images::{self, BARE, Elf, HOLDFAST, PIL, PRODUCTS};
+use crate::lookups::{self, LOOKUP_MAX};
 use crate::pil::machine::CORTEX_M4;
-use crate::pil::qemu::{PilError, Target, instructions};
+use crate::pil::qemu::{Target, instructions};
 use crate::pil::run::{Pair, closed_loop};
 use crate::pil::scenario;
-use crate::root;
 
 /// Goal for code and constants of the charger without a HAL \[bytes\].
 const CORE_MAX: u32 = 16 * 1024;
 /// Goal for variables and stack \[bytes\].
 const RAM_MAX: u32 = 4 * 1024;
-/// Goal for a lookup \[instructions\].
-const LOOKUP_MAX: u32 = 350;
 /// Goal for a tick \[instructions\].
-const TICK_MAX: u32 = 5_000;
+const TICK_MAX: u32 = 3_500;
 /// What the runtime paints unused stack with.
 const PAINT: [u8; 4] = [0xCC; 4];
 /// How long the charger without a HAL runs before its stack is read: many rounds of what it plays.
 const PAINTED_RUN: Duration = Duration::from_secs(4);
 /// Random scenarios with faults for the worst tick.
 const SCENARIOS: u64 = 60;
-/// Lookups of each law that are counted.
-const LOOKUPS: usize = 1000;
-
-/// Why nothing was measured, or the figures are not as they must be.
-#[derive(Debug, thiserror::Error)]
-pub enum CostError {
-    /// An image.
-    #[error(transparent)]
-    Image(#[from] ImageError),
-    /// The link.
-    #[error(transparent)]
-    Pil(#[from] PilError),
-    /// A file or QEMU.
-    #[error("{what}: {source}")]
-    Io {
-        /// What was tried.
-        what: String,
-        /// Why it failed.
-        source: io::Error,
-    },
-    /// A symbol of the image is missing.
-    #[error("the image has no symbol {0}")]
-    Symbol(&'static str),
-    /// A figure misses its goal for the first time, or differs.
-    #[error("{0}")]
-    Wrong(String),
-}
-
-fn io_error(what: impl Into<String>) -> impl FnOnce(io::Error) -> CostError {
-    let what = what.into();
-    |source| CostError::Io { what, source }
-}
-
-/// A list of figures as it is committed.
-#[derive(Debug, Default)]
-pub struct Figures {
-    text: String,
-    missed: Vec<String>,
-}
-
-impl Figures {
-    pub(crate) fn line(&mut self, name: &str, value: u32, unit: &str, goal: Option<u32>) {
-        let goal_text = match goal {
-            None => String::new(),
-            Some(goal) if value <= goal => format!("  goal at most {goal}"),
-            Some(goal) => format!("  goal at most {goal}: MISSED by {}", value - goal),
-        };
-        let line = format!("{name:<60}{value:>8} {unit}{goal_text}");
-        if goal.is_some_and(|goal| value > goal) {
-            self.missed.push(line.clone());
-        }
-        self.text.push_str(&line);
-        self.text.push('\n');
-    }
-
-    pub(crate) fn note(&mut self, text: &str) {
-        let _ = writeln!(self.text, "# {text}");
-    }
-
-    /// The text.
-    pub fn text(&self) -> &str {
-        &self.text
-    }
-
-    /// Compares with the committed file, or replaces it.
-    ///
-    /// # Errors
-    /// A goal is missed that the file does not show as missed, or a figure differs although
-    /// compiler and table are the file's.
-    pub fn check(&self, file: &str, bless: bool) -> Result<(), CostError> {
-        let path = root().join("firmware/expected").join(file);
-        if bless {
-            fs::write(&path, &self.text).map_err(io_error(path.display().to_string()))?;
-        }
-        let committed = fs::read_to_string(&path).map_err(io_error(path.display().to_string()))?;
-        // A goal that the committed figures miss already is told every time; a new miss fails,
-        // whatever the table.
-        let known = |line: &&String| committed.lines().any(|old| old == line.as_str());
-        for line in self.missed.iter().filter(known) {
-            println!("    {file}: known miss: {line}");
-        }
-        let new: Vec<&str> = self
-            .missed
-            .iter()
-            .filter(|line| !known(line))
-            .map(String::as_str)
-            .collect();
-        if !new.is_empty() {
-            return Err(CostError::Wrong(new.join("\n")));
-        }
-        let notes = |text: &str| -> Vec<String> {
-            let lines = text.lines().filter(|line| line.starts_with('#'));
-            lines.map(str::to_owned).collect()
-        };
-        let differs = difference(&committed, &self.text);
-        if differs.is_empty() {
-            println!("    {file}: as committed");
-            Ok(())
-        } else if notes(&committed) == notes(&self.text) {
-            let message =
-                format!("{file} differs; `cargo fw costs --bless` takes it over:\n{differs}");
-            Err(CostError::Wrong(message))
-        } else {
-            println!(
-                "    {file}: other compiler or table than committed; no new goal is missed:\n{differs}"
-            );
-            Ok(())
-        }
-    }
-}
-
-fn difference(old: &str, new: &str) -> String {
-    let mut text = String::new();
-    for line in old.lines().filter(|line| !new.lines().any(|n| n == *line)) {
-        let _ = writeln!(text, "  - {line}");
-    }
-    for line in new.lines().filter(|line| !old.lines().any(|o| o == *line)) {
-        let _ = writeln!(text, "  + {line}");
-    }
-    text
-}
-
-pub(crate) fn compiler() -> String {
-    let output = Command::new("rustc").arg("--version").output();
-    output.map_or_else(
-        |_| "unknown compiler".into(),
-        |output| String::from_utf8_lossy(&output.stdout).trim().to_owned(),
-    )
-}
 
 /// Demangled enough to search in: the path parts are in the mangled name as they are.
 pub(crate) fn count(symbols: &[String], parts: &[&str]) -> u32 {
@@ -297,7 +164,7 @@ pub fn run(table: &[u8]) -> Result<Figures, CostError> {
         "bytes",
         None,
     );
-    let lookup = worst_lookup(&mut target, table)?;
+    let lookup = lookups::dearest(&mut target, table)?;
     figures.line(
         "lookup with quantiser",
         lookup,
@@ -366,40 +233,4 @@ fn emulate(image: &Path, loader: &str, dump: &Path, memory: Range<u32>) -> Resul
     }
     qemu.wait().map_err(io_error("qemu-system-arm"))?;
     Ok(())
-}
-
-/// Instructions of the dearest lookup among the cells with the most visits of each law.
-fn worst_lookup(target: &mut Target, table: &[u8]) -> Result<u32, CostError> {
-    let view = TableView::parse(table)
-        .map_err(|error| CostError::Wrong(format!("the table is rejected: {error:?}")))?;
-    let grid = view.header().grid;
-    let mut worst = 0;
-    for law in Law::ALL {
-        let Some(reader) = view.law(law) else {
-            continue;
-        };
-        // A sample of the grid by a stride that is prime to it, the dearest cells first.
-        let cells = grid.cells();
-        let stride = 100_003;
-        let mut dearest: Vec<_> = (0..cells.min(400_000))
-            .filter_map(|n| {
-                let index = u64::from(n) * stride % u64::from(cells);
-                let cell = grid.cell(index as u32)?;
-                let low = grid.bounds(cell)?.map(|(low, _)| low);
-                Some((reader.visits(cell), low))
-            })
-            .collect();
-        dearest.sort_by_key(|(visits, _)| std::cmp::Reverse(*visits));
-        for (_, state) in dearest.into_iter().take(LOOKUPS) {
-            let reply = target.ask(&Request::Lookup {
-                law: law as u8,
-                state,
-            })?;
-            if reply.response == Response::Refused {
-                return Err(CostError::Wrong("a lookup was refused".into()));
-            }
-            worst = worst.max(instructions(reply.systick));
-        }
-    }
-    Ok(worst)
 }

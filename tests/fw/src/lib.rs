@@ -7,13 +7,17 @@
 //! | [`pil`] | processor in the loop: QEMU, the lock-step link, scenarios, the host beside it |
 //! | [`c_api`] | the C interface: libraries, the C program in QEMU, costs, the CMake package |
 //! | [`board`] | the unmodified images on an emulated board, and the same runs on the host |
+//! | [`lookups`] | the dearest lookup of every shipped table |
+//! | [`figures`] | figures with goals, as they are committed |
 //! | [`costs`] | flash, RAM, stack and instructions, compared with what is committed |
 #![forbid(unsafe_code)]
 
 pub mod board;
 pub mod c_api;
 pub mod costs;
+pub mod figures;
 pub mod images;
+pub mod lookups;
 pub mod pil;
 pub mod table_fit;
 

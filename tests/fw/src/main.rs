@@ -15,8 +15,10 @@ use firmware::table::TableView;
 use fw::board::{self, BoardError};
 use fw::c_api::program::{CORTEX_M0, CORTEX_M4};
 use fw::c_api::{self, CApiError};
-use fw::costs::{self, CostError};
+use fw::costs;
+use fw::figures::CostError;
 use fw::images::{self, Elf, Image, PIL, PRODUCTS};
+use fw::lookups;
 use fw::pil::machine::{self, Machine};
 use fw::pil::qemu::Target;
 use fw::pil::run::{Outcome, Pair, closed_loop, recorded};
@@ -455,7 +457,13 @@ fn measure(bless: bool) -> Result<(), AnyError> {
     print!("{}", sizes.text());
     let run = costs::run(&table_bytes(None)?)?;
     print!("{}", run.text());
-    let checks = [sizes.check("sizes.txt", bless), run.check("run.txt", bless)];
+    let lookups = lookups::lookups()?;
+    print!("{}", lookups.text());
+    let checks = [
+        sizes.check("sizes.txt", bless),
+        run.check("run.txt", bless),
+        lookups.check("lookups.txt", bless),
+    ];
     for check in checks {
         check?;
     }

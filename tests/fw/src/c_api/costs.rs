@@ -8,7 +8,8 @@ use super::calls::Recording;
 use super::chargers::{self, Tally};
 use super::error::{CApiError, io_error};
 use super::program::{self, CORTEX_M0, CORTEX_M4, Place};
-use crate::costs::{Figures, compiler, count};
+use crate::costs::count;
+use crate::figures::{Figures, compiler};
 use crate::images::Elf;
 
 /// Goal for code and constants on a Cortex-M4F \[bytes\].
