@@ -94,8 +94,8 @@ fn the_spec_says_what_is_drawn_and_a_cut_chain_says_so() {
     assert!(option["states"].as_u64().unwrap() > 10_000 && option["cut"].is_null());
 }
 
-/// Hold, and commands that act a second late: a chain is made (and cut here), with one step a period;
-/// the union has one draw for each, eleven of which begin in ten seconds.
+/// Hold, and commands that act a second late: a chain is made (and cut here), with one step a
+/// period; the union has one draw for each, eleven of which begin in ten seconds.
 #[test]
 fn a_table_whose_commands_act_late_has_a_chain() {
     let asked = ["--participation", "gaussian:0.02", "--horizon-s", "10"];

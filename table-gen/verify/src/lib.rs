@@ -199,6 +199,7 @@ pub fn verify_assuming(
         && let Some(reason) = premise.reason(&tally)
     {
         tally.limit.get_or_insert(reason);
+        counts.event_to_inner_s = None;
     }
     counts.lookups = tally.lookups;
     counts.held_hz = tally.held.map(|range| [range.low / 1e6, range.high / 1e6]);

@@ -2,8 +2,8 @@
 //! added to its net power.
 //!
 //! Write K for 1/R_eq, K₀, H₀, D₀ for the nominal values, κ = K/K₀, and N for the power that
-//! accelerates the grid. K is constant. The governor chain is linear in its gain, so q = (g, l, p)/κ
-//! obeys the nominal chain,
+//! accelerates the grid. K is constant. The governor chain is linear in its gain, so that
+//! q = (g, l, p)/κ obeys the nominal chain,
 //!
 //! ```text
 //! q_g' = (K₀ f - q_g)/T_G    q_l' = (q_g + T_1 q_g' - q_l)/T_2    q_p' = (q_l - q_p)/T_t
@@ -59,16 +59,18 @@ pub(crate) struct Premise {
 impl Premise {
     /// For a spec's bands and states at the event \[micro-units\], if it has any.
     pub(crate) fn of(spec: &Spec, initial: &[Interval; STATES]) -> Option<Self> {
+        let plant = Plant::new(spec);
         let bands = [
-            spec.inertia_band(),
-            spec.governor_gain_band(),
-            spec.damping_band(),
+            (spec.inertia_band(), plant.inertia),
+            (spec.governor_gain_band(), plant.governor_gain),
+            (spec.damping_band(), plant.damping),
         ];
-        if bands.iter().all(|[low, high]| low == high) {
+        // A band of one number may be another than the nominal one.
+        if bands.iter().all(|(band, nominal)| *band == [*nominal; 2]) {
             return None;
         }
-        let [inertia, governor_gain, damping] = bands.map(|[low, high]| Interval::hull(low, high));
-        let plant = Plant::new(spec);
+        let [inertia, governor_gain, damping] =
+            bands.map(|([low, high], _)| Interval::hull(low, high));
         let point = Interval::point;
         // Without containment no range can be proven; the spec is refused before.
         let f = match spec.counted_frequency_hz() {

@@ -119,16 +119,27 @@ impl Spec {
         self.uncertainty.damping_gw_per_hz.unwrap_or([nominal; 2])
     }
 
-    /// Whether H, 1/R_eq or D may be another than the plant's.
+    /// Whether H, 1/R_eq or D may be another than the plant's: a band of one number that is not the
+    /// plant's is such a band.
     #[must_use]
     pub fn has_plant_band(&self) -> bool {
-        [
-            self.inertia_band(),
-            self.governor_gain_band(),
-            self.damping_band(),
-        ]
-        .iter()
-        .any(|[low, high]| low < high)
+        let plant = &self.plant;
+        self.inertia_band() != [plant.inertia_gw_s_per_hz; 2]
+            || self.governor_gain_band() != [plant.governor_gain_gw_per_hz; 2]
+            || self.damping_band() != [plant.damping_gw_per_hz; 2]
+    }
+
+    /// The same of T_G, T_t, T_1 and T_2.
+    #[must_use]
+    pub fn has_time_constant_band(&self) -> bool {
+        let plant = &self.plant;
+        self.time_constant_bands()
+            != [
+                [plant.governor_time_s; 2],
+                [plant.turbine_time_s; 2],
+                [plant.lead_time_s; 2],
+                [plant.lag_time_s; 2],
+            ]
     }
 
     /// The deviations \[Hz\] for which games count a plant that is known in bands: from a little

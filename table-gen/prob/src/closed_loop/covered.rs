@@ -38,15 +38,8 @@ pub(super) fn covered(table: &TableView<'_>, spec: &Spec) -> Result<(), ClosedLo
             "uncertainty.own_clocks = false is",
         );
     }
-    let bands = [
-        spec.inertia_band(),
-        spec.governor_gain_band(),
-        spec.damping_band(),
-    ];
-    for [low, high] in bands.into_iter().chain(spec.time_constant_bands()) {
-        if low < high {
-            return unsupported("a plant known in bands", "one plant is");
-        }
+    if spec.has_plant_band() || spec.has_time_constant_band() {
+        return unsupported("a plant known in bands", "one plant is");
     }
     if spec.uncertainty.participation > 0.0 || spec.uncertainty.participation_absolute > 0.0 {
         return unsupported(

@@ -14,7 +14,7 @@
 //! of them is an adversary's choice.
 //!
 //! Where there is Hold, or commands act late, a node is what was decided, and the set in which it
-//! begins to act ([`ahead`]): it has one decided state.
+//! begins to act (`ahead`): it has one decided state.
 //!
 //! # Steps
 //! A step is a period, but in Fixed it ends at the tick at which f leaves I2. After such a step

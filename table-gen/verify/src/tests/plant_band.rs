@@ -107,7 +107,11 @@ fn leaving(real: &Spec, believed: &Spec, seed: u64) -> u32 {
 
 #[test]
 fn plants_within_the_bands_stay_in_the_sets() {
-    let bands: [&[&str]; 7] = [
+    let bands: [&[&str]; 10] = [
+        // One number each, and not the plant's own.
+        &["uncertainty.inertia_gw_s_per_hz=[3.4,3.4]"],
+        &["uncertainty.governor_gain_gw_per_hz=[-5.6,-5.6]"],
+        &["uncertainty.damping_gw_per_hz=[0.6,0.6]"],
         &[H],
         &[LOST],
         &[K],
@@ -127,7 +131,12 @@ fn plants_within_the_bands_stay_in_the_sets() {
 #[test]
 fn plants_within_a_band_that_is_forgotten_leave_the_sets() {
     let nominal = load("gb-bi-band", &[]);
-    for forgotten in [&[H][..], &[LOST], &[K], &[D], &[H, K, D]] {
+    let one = [
+        "uncertainty.inertia_gw_s_per_hz=[3.4,3.4]",
+        "uncertainty.governor_gain_gw_per_hz=[-4,-4]",
+        "uncertainty.damping_gw_per_hz=[0,0]",
+    ];
+    for forgotten in [&[H][..], &[LOST], &[K], &[D], &[H, K, D], &one] {
         let real = load("gb-bi-band", forgotten);
         assert!(leaving(&real, &nominal, 7) > 0, "{forgotten:?}");
     }

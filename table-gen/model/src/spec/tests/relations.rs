@@ -228,6 +228,10 @@ fn what_games_do_not_cover_is_refused_by_its_key_and_taken_for_a_response() {
         "uncertainty.inertia_lost_s_per_hz=0.05",
         "uncertainty.governor_gain_gw_per_hz=[-5, -4.9]",
         "uncertainty.damping_gw_per_hz=[0.9, 1]",
+        // One number is a band too, if it is not the plant's.
+        "uncertainty.inertia_gw_s_per_hz=[2, 2]",
+        "uncertainty.governor_gain_gw_per_hz=[-1, -1]",
+        "uncertainty.damping_gw_per_hz=[0, 0]",
     ] {
         with(&[option]).unwrap();
         let unlimited = [option, "requirements.containment_hz=none"];
