@@ -250,6 +250,13 @@ pub fn verify_staged(
             remedy: "a response is",
         });
     }
+    if let Some(lost) = spec.uncertainty.inertia_lost_s_per_hz {
+        return Err(VerifyError::Unsupported {
+            key: "uncertainty.inertia_lost_s_per_hz",
+            found: format!("{lost}, beside a loss in stages"),
+            remedy: "one H during the event is",
+        });
+    }
     let proof = response::verify_staged(&table, spec, stages, go_on)?;
     Ok(verdict_of_response(&table, spec, spec, proof))
 }

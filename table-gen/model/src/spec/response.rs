@@ -6,7 +6,7 @@ use super::keys::RECOVERY;
 use super::meter::MeterKind;
 use super::origin::{Origin, inconsistent};
 use super::sampling::to_whole_ms;
-use super::{Domain, Spec, SpecError};
+use super::{Domain, LossProfile, Spec, SpecError};
 use crate::independence::Crowd;
 use crate::table_fields;
 
@@ -26,6 +26,7 @@ pub(super) fn check(spec: &Spec, origin: &Origin) -> Result<(), SpecError> {
         let allowed = format!("at least {INERTIA_LEAST} GW s/Hz after the largest loss");
         return Err(inconsistent(origin, key, found, allowed));
     }
+    check_plant_bands(spec, origin)?;
     if spec.preference.always_on {
         check_law(spec, origin)
     } else {
@@ -33,8 +34,76 @@ pub(super) fn check(spec: &Spec, origin: &Origin) -> Result<(), SpecError> {
     }
 }
 
+/// Every band of the plant holds the plant's own number, which simulation, the device's observer
+/// and its droop know.
+fn check_plant_bands(spec: &Spec, origin: &Origin) -> Result<(), SpecError> {
+    let (plant, bands) = (&spec.plant, &spec.uncertainty);
+    let all = [
+        (
+            "uncertainty.inertia_gw_s_per_hz",
+            bands.inertia_gw_s_per_hz,
+            "plant.inertia_gw_s_per_hz",
+            plant.inertia_gw_s_per_hz,
+        ),
+        (
+            "uncertainty.governor_gain_gw_per_hz",
+            bands.governor_gain_gw_per_hz,
+            "plant.governor_gain_gw_per_hz",
+            plant.governor_gain_gw_per_hz,
+        ),
+        (
+            "uncertainty.damping_gw_per_hz",
+            bands.damping_gw_per_hz,
+            "plant.damping_gw_per_hz",
+            plant.damping_gw_per_hz,
+        ),
+        (
+            "uncertainty.governor_time_s",
+            bands.governor_time_s,
+            "plant.governor_time_s",
+            plant.governor_time_s,
+        ),
+        (
+            "uncertainty.turbine_time_s",
+            bands.turbine_time_s,
+            "plant.turbine_time_s",
+            plant.turbine_time_s,
+        ),
+        (
+            "uncertainty.lead_time_s",
+            bands.lead_time_s,
+            "plant.lead_time_s",
+            plant.lead_time_s,
+        ),
+        (
+            "uncertainty.lag_time_s",
+            bands.lag_time_s,
+            "plant.lag_time_s",
+            plant.lag_time_s,
+        ),
+    ];
+    for (key, band, of, own) in all {
+        if let Some([low, high]) = band
+            && !(low..=high).contains(&own)
+        {
+            let found = format!("[{low}, {high}], beside {of} = {own}");
+            return Err(inconsistent(origin, key, found, "a band that holds it"));
+        }
+    }
+    Ok(())
+}
+
 /// A law that the device can hold in whole numbers.
 fn check_law(spec: &Spec, origin: &Origin) -> Result<(), SpecError> {
+    if let Some(lost) = spec.uncertainty.inertia_lost_s_per_hz
+        && spec.uncertainty.loss_profile != LossProfile::Constant
+    {
+        let key = "uncertainty.inertia_lost_s_per_hz";
+        let found = format!("{lost}, beside a loss that moves (uncertainty.loss_profile)");
+        let allowed = "none, or uncertainty.loss_profile = \"constant\": the proof of a response \
+                       knows an H that stays what it is after the event";
+        return Err(inconsistent(origin, key, found, allowed));
+    }
     let preference = &spec.preference;
     if let Some(found) = preference.recovery_per_s {
         let allowed = "none beside preference.always_on = true: no game leaves anything free";

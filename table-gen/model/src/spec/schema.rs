@@ -87,7 +87,8 @@ impl Spec {
     }
 
     /// Least and most H \[GW s/Hz\]: the band of `[uncertainty]`, or the plant's, less what may go
-    /// with the largest loss. The proof lets H move inside this as it likes.
+    /// with the largest loss. The proof of a response is about any H inside that stays what it is
+    /// from the event on; games let H move.
     #[must_use]
     pub fn inertia_band(&self) -> [f64; 2] {
         let nominal = self.plant.inertia_gw_s_per_hz;

@@ -36,8 +36,11 @@
 //! |l - p| <= |(l - p)(0)| + h (i_2 |g - l| + r |s|)
 //! ```
 //!
-//! since a positive rate only takes from a difference. These bounds would let the time constants
-//! move within their bands; the bound of p' in `window` needs a T_t that stays what it is.
+//! since a positive rate only takes from a difference.
+//!
+//! All parameters are constant. `g' opposes` needs a K that does not jump, the bound of p' in
+//! `window` a T_t that stays, the chord of f between samples an H, a D and a K that do; and where
+//! bands are cut into cells (`plan`), each cell is proven for plants that stay in it.
 
 use model::interval::Interval;
 use model::plant::STATES;
@@ -108,8 +111,12 @@ pub(super) fn most(number: &FleetLoop, step: &OfStep, magnitude: &[f64; STATES])
     let unknown_gain = number.gain_radius * step.f_most;
     let of_known_times =
         number.step_s * (spread * unknown_f + dot(magnitude, &number.spread_gain) * unknown_gain);
-    let (Some(unknown), Some(added)) = (&number.unknown_times, &step.times) else {
+    let Some(unknown) = &number.unknown_times else {
         return of_known_times;
+    };
+    // Without a bound there is none of the whole.
+    let Some(added) = &step.times else {
+        return f64::INFINITY;
     };
     let of_times = unknown.spread.iter().zip(added);
     let of_times: f64 = of_times

@@ -228,10 +228,6 @@ fn what_games_do_not_cover_is_refused_by_its_key_and_taken_for_a_response() {
         "uncertainty.inertia_lost_s_per_hz=0.05",
         "uncertainty.governor_gain_gw_per_hz=[-5, -4.9]",
         "uncertainty.damping_gw_per_hz=[0.9, 1]",
-        // One number is a band too, if it is not the plant's.
-        "uncertainty.inertia_gw_s_per_hz=[2, 2]",
-        "uncertainty.governor_gain_gw_per_hz=[-1, -1]",
-        "uncertainty.damping_gw_per_hz=[0, 0]",
     ] {
         with(&[option]).unwrap();
         let unlimited = [option, "requirements.containment_hz=none"];
@@ -326,6 +322,44 @@ fn a_preferred_law_of_games_goes_with_every_winning_cell() {
     let set = [law.to_owned()];
     let error = Spec::load("gb-bi", &set).unwrap_err();
     assert_eq!(error.key(), Some("preference.recovery_per_s"), "{error}");
+}
+
+#[test]
+fn a_band_of_the_plant_holds_the_plants_own_number() {
+    for option in [
+        "uncertainty.inertia_gw_s_per_hz=[2, 2]",
+        "uncertainty.governor_gain_gw_per_hz=[-4.9, -1]",
+        "uncertainty.damping_gw_per_hz=[1.1, 2]",
+        "uncertainty.governor_time_s=[2.6, 3]",
+        "uncertainty.turbine_time_s=[0.1, 0.4]",
+        "uncertainty.lead_time_s=[2.5, 3]",
+        "uncertainty.lag_time_s=[40, 41]",
+    ] {
+        let key = option.split('=').next().unwrap();
+        for base in ["gb-bi", "paper-bi"] {
+            let error = Spec::load(base, &[option.to_owned()]).unwrap_err();
+            let message = error.to_string();
+            assert_eq!(error.key(), Some(key), "{message}");
+            assert!(message.contains("beside plant."), "{message}");
+        }
+    }
+}
+
+/// A response's proof knows an H that stays after the event; games let it move.
+#[test]
+fn inertia_goes_with_a_loss_that_stays_unless_it_may_move() {
+    let lost = "uncertainty.inertia_lost_s_per_hz=0.1";
+    for profile in ["band", "non-decreasing"] {
+        let profile = format!("uncertainty.loss_profile={profile}");
+        let error = Spec::load("gb-bi", &[lost.to_owned(), profile]).unwrap_err();
+        assert_eq!(
+            error.key(),
+            Some("uncertainty.inertia_lost_s_per_hz"),
+            "{error}"
+        );
+    }
+    Spec::load("gb-bi", &[lost.to_owned()]).unwrap();
+    with(&[lost, "uncertainty.loss_profile=band"]).unwrap();
 }
 
 /// 4 GW s/Hz less 2.2 GW times what goes with each.
