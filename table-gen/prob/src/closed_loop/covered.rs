@@ -32,6 +32,18 @@ pub(super) fn covered(table: &TableView<'_>, spec: &Spec) -> Result<(), ClosedLo
             "uncertainty.actuation_delay_s of at most sampling.period_s, or a range below it, is",
         );
     }
+    // Ages of excursions are counted in 16 bits, and grow by a period past the time to settle; what
+    // is found at once is only there a tick and the delay later.
+    let tick_s = f64::from(header.tick_ms) / 1000.0;
+    let settle_ticks = spec.requirements.settle_within_s / tick_s;
+    let least = f64::from(header.delay_ticks) + 1.0;
+    let most = f64::from(u16::MAX) - 2.0 * f64::from(header.period_ticks) - least;
+    if !(least..=most).contains(&settle_ticks) {
+        return unsupported(
+            &format!("a time to settle of {settle_ticks} watch ticks"),
+            "requirements.settle_within_s from the delay and a tick up to 65,535 ticks less two periods and the delay is",
+        );
+    }
     if spec.uncertainty.own_clocks {
         return unsupported(
             "chargers with own clocks",

@@ -196,19 +196,26 @@ fn the_first_seconds_are_bounded() {
 #[test]
 fn what_is_not_covered_is_named() {
     let table = TableView::parse(TABLE).unwrap();
-    let spec = Spec::load(
-        "paper-bi",
-        &["uncertainty.actuation_delay_s=0.5".to_owned()],
-    )
-    .unwrap();
-    let found = build(
-        &table,
-        &spec,
-        &Participation::Exact,
-        &settings(4.0),
-        &|_, _| true,
-    );
-    assert!(matches!(found, Err(ClosedLoopError::Unsupported { .. })));
+    for option in [
+        "uncertainty.actuation_delay_s=0.5",
+        "uncertainty.damping_gw_per_hz=[0.9,1.1]",
+        // A tick of 0.1 s: past 16 bits, and shorter than a tick.
+        "requirements.settle_within_s=6600",
+        "requirements.settle_within_s=0.05",
+    ] {
+        let spec = Spec::load("paper-bi", &[option.to_owned()]).unwrap();
+        let found = build(
+            &table,
+            &spec,
+            &Participation::Exact,
+            &settings(4.0),
+            &|_, _| true,
+        );
+        assert!(
+            matches!(found, Err(ClosedLoopError::Unsupported { .. })),
+            "{option}"
+        );
+    }
 }
 
 /// A chain that is cut bounds what the whole one does: the same as far as it was followed, and
