@@ -89,6 +89,7 @@ fn the_key_table_and_the_structs_have_the_same_keys() {
         "uncertainty.hostile_share=0.01",
         "uncertainty.level_discrepancy=0.04",
         "uncertainty.inertia_lost_s_per_hz=0.1",
+        "uncertainty.loss_profile=constant",
         "uncertainty.participation_absolute=0.99",
         "uncertainty.participation_confidence=0.5",
         "requirements.changes_per_300_s=30",

@@ -380,10 +380,6 @@ fn inertia_that_goes_with_the_loss_leaves_some() {
         error.contains("uncertainty.inertia_lost_s_per_hz"),
         "{error}"
     );
-    refused(
-        &["uncertainty.inertia_lost_s_per_hz=0.1"],
-        "uncertainty.inertia_lost_s_per_hz",
-    );
 }
 
 #[test]
