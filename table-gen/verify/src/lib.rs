@@ -196,7 +196,8 @@ pub fn verify_assuming(
         (tally, explored.cells, Method::TightSets, scope)
     };
     if let Some(premise) = &model.plant_band
-        && let Some(reason) = premise.reason(&tally)
+        && let (Some(low), Some(high)) = (tally.lowest, tally.highest)
+        && let Some(reason) = premise.reason([low, high])
     {
         tally.limit.get_or_insert(reason);
         counts.event_to_inner_s = None;

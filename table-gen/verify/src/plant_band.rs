@@ -34,8 +34,6 @@ use model::interval::Interval;
 use model::plant::{Plant, STATES};
 use model::spec::Spec;
 
-use super::outcome::Outcome;
-
 /// By how much f must end inside the range \[µHz\].
 const INSIDE: f64 = 1.0;
 
@@ -74,7 +72,9 @@ impl Premise {
         let point = Interval::point;
         // Without containment no range can be proven; the spec is refused before.
         let f = match spec.counted_frequency_hz() {
-            Some([low, high]) => Interval::hull(low, high) * point(super::closed_loop::MICRO),
+            Some([low, high]) => {
+                Interval::hull(low, high) * point(f64::from(firmware::units::MICRO))
+            }
             None => initial[AXIS_F],
         };
         let asked = point(plant.governor_gain) * f;
@@ -99,9 +99,9 @@ impl Premise {
         v + self.gain * self.q - self.damping * self.f + self.lighter * accelerating
     }
 
-    /// Why an exploration says nothing, if f may leave the range that it rests on.
-    pub(crate) fn reason(&self, tally: &Outcome) -> Option<String> {
-        let (low, high) = (tally.lowest?, tally.highest?);
+    /// Why an exploration in which f was between two ends \[µHz\] says nothing, if f may leave the
+    /// range that it rests on.
+    pub(crate) fn reason(&self, [low, high]: [f64; 2]) -> Option<String> {
         let inside = low >= self.f.low + INSIDE && high <= self.f.high - INSIDE;
         (!inside).then(|| {
             format!(
