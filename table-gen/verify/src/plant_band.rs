@@ -57,18 +57,14 @@ pub(crate) struct Premise {
 impl Premise {
     /// For a spec's bands and states at the event \[micro-units\], if it has any.
     pub(crate) fn of(spec: &Spec, initial: &[Interval; STATES]) -> Option<Self> {
-        let plant = Plant::new(spec);
-        let bands = [
-            (spec.inertia_band(), plant.inertia),
-            (spec.governor_gain_band(), plant.governor_gain),
-            (spec.damping_band(), plant.damping),
-        ];
-        // A band of one number may be another than the nominal one.
-        if bands.iter().all(|(band, nominal)| *band == [*nominal; 2]) {
+        if !spec.has_plant_band() {
             return None;
         }
-        let [inertia, governor_gain, damping] =
-            bands.map(|([low, high], _)| Interval::hull(low, high));
+        let plant = Plant::new(spec);
+        let hull = |[low, high]: [f64; 2]| Interval::hull(low, high);
+        let inertia = hull(spec.inertia_band());
+        let governor_gain = hull(spec.governor_gain_band());
+        let damping = hull(spec.damping_band());
         let point = Interval::point;
         // Without containment no range can be proven; the spec is refused before.
         let f = match spec.counted_frequency_hz() {

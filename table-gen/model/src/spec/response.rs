@@ -5,6 +5,7 @@ use firmware::response::WINDOW_TICKS_MAX;
 use super::keys::RECOVERY;
 use super::meter::MeterKind;
 use super::origin::{Origin, inconsistent};
+use super::plant_bands;
 use super::sampling::to_whole_ms;
 use super::{Domain, LossProfile, Spec, SpecError};
 use crate::independence::Crowd;
@@ -26,71 +27,11 @@ pub(super) fn check(spec: &Spec, origin: &Origin) -> Result<(), SpecError> {
         let allowed = format!("at least {INERTIA_LEAST} GW s/Hz after the largest loss");
         return Err(inconsistent(origin, key, found, allowed));
     }
-    check_plant_bands(spec, origin)?;
     if spec.preference.always_on {
         check_law(spec, origin)
     } else {
         check_games(spec, origin)
     }
-}
-
-/// Every band of the plant holds the plant's own number, which simulation, the device's observer
-/// and its droop know.
-fn check_plant_bands(spec: &Spec, origin: &Origin) -> Result<(), SpecError> {
-    let (plant, bands) = (&spec.plant, &spec.uncertainty);
-    let all = [
-        (
-            "uncertainty.inertia_gw_s_per_hz",
-            bands.inertia_gw_s_per_hz,
-            "plant.inertia_gw_s_per_hz",
-            plant.inertia_gw_s_per_hz,
-        ),
-        (
-            "uncertainty.governor_gain_gw_per_hz",
-            bands.governor_gain_gw_per_hz,
-            "plant.governor_gain_gw_per_hz",
-            plant.governor_gain_gw_per_hz,
-        ),
-        (
-            "uncertainty.damping_gw_per_hz",
-            bands.damping_gw_per_hz,
-            "plant.damping_gw_per_hz",
-            plant.damping_gw_per_hz,
-        ),
-        (
-            "uncertainty.governor_time_s",
-            bands.governor_time_s,
-            "plant.governor_time_s",
-            plant.governor_time_s,
-        ),
-        (
-            "uncertainty.turbine_time_s",
-            bands.turbine_time_s,
-            "plant.turbine_time_s",
-            plant.turbine_time_s,
-        ),
-        (
-            "uncertainty.lead_time_s",
-            bands.lead_time_s,
-            "plant.lead_time_s",
-            plant.lead_time_s,
-        ),
-        (
-            "uncertainty.lag_time_s",
-            bands.lag_time_s,
-            "plant.lag_time_s",
-            plant.lag_time_s,
-        ),
-    ];
-    for (key, band, of, own) in all {
-        if let Some([low, high]) = band
-            && !(low..=high).contains(&own)
-        {
-            let found = format!("[{low}, {high}], beside {of} = {own}");
-            return Err(inconsistent(origin, key, found, "a band that holds it"));
-        }
-    }
-    Ok(())
 }
 
 /// A law that the device can hold in whole numbers.
@@ -209,15 +150,9 @@ fn check_games(spec: &Spec, origin: &Origin) -> Result<(), SpecError> {
             format!("{other}, or {is_response}"),
         ))
     };
-    let bands = [
-        ("uncertainty.governor_time_s", uncertainty.governor_time_s),
-        ("uncertainty.turbine_time_s", uncertainty.turbine_time_s),
-        ("uncertainty.lead_time_s", uncertainty.lead_time_s),
-        ("uncertainty.lag_time_s", uncertainty.lag_time_s),
-    ];
-    for (key, band) in bands {
-        if let Some(band) = band {
-            return refuse(key, format!("{band:?}"), "none");
+    for band in plant_bands::of_times(spec) {
+        if let Some(given) = band.given {
+            return refuse(band.key, format!("{given:?}"), "none");
         }
     }
     if spec.has_plant_band() && spec.requirements.containment_hz.is_none() {

@@ -2,6 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::plant_bands::{self, PlantBand};
 use super::{
     BaselineSpec, ChanceSpec, ChargerSpec, Direction, FleetSpec, GridSpec, InputSpec, MeterSpec,
     MethodSpec, PlantSpec, PreferenceSpec, RequirementsSpec, SamplingSpec, TableSpec,
@@ -120,27 +121,17 @@ impl Spec {
         self.uncertainty.damping_gw_per_hz.unwrap_or([nominal; 2])
     }
 
-    /// Whether H, 1/R_eq or D may be another than the plant's: a band of one number that is not the
-    /// plant's is such a band.
+    /// Whether H, 1/R_eq or D may be another than the plant's.
     #[must_use]
     pub fn has_plant_band(&self) -> bool {
-        let plant = &self.plant;
-        self.inertia_band() != [plant.inertia_gw_s_per_hz; 2]
-            || self.governor_gain_band() != [plant.governor_gain_gw_per_hz; 2]
-            || self.damping_band() != [plant.damping_gw_per_hz; 2]
+        let goes = self.uncertainty.inertia_lost_s_per_hz.is_some();
+        goes || plant_bands::of_swing(self).iter().any(PlantBand::is_wider)
     }
 
-    /// The same of T_G, T_t, T_1 and T_2.
+    /// Whether T_G, T_t, T_1 or T_2 may be.
     #[must_use]
     pub fn has_time_constant_band(&self) -> bool {
-        let plant = &self.plant;
-        self.time_constant_bands()
-            != [
-                [plant.governor_time_s; 2],
-                [plant.turbine_time_s; 2],
-                [plant.lead_time_s; 2],
-                [plant.lag_time_s; 2],
-            ]
+        plant_bands::of_times(self).iter().any(PlantBand::is_wider)
     }
 
     /// The deviations \[Hz\] for which games count a plant that is known in bands: from a little

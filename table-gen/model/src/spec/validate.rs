@@ -8,6 +8,7 @@ use super::allowed::{self, Allowed};
 use super::key_value::KeyValue;
 use super::keys::{KEYS, Key};
 use super::origin::{Origin, inconsistent};
+use super::plant_bands;
 use super::sampling::{to_ms, to_whole_ms};
 use super::{
     InputSpec, RequirementsSpec, SamplingSpec, Spec, SpecError, UncertaintySpec, chance, formula,
@@ -41,6 +42,7 @@ impl Spec {
         check_input(&self.input, origin)?;
         check_sampling(&self.sampling, origin)?;
         check_uncertainty(&self.uncertainty, origin)?;
+        plant_bands::check(self, origin)?;
         check_charger(self, origin)?;
         if !self.preference.always_on {
             check_delay(&self.uncertainty, &self.sampling, origin)?;
@@ -187,33 +189,6 @@ fn check_uncertainty(uncertainty: &UncertaintySpec, origin: &Origin) -> Result<(
             Some(*uncertainty.actuation_delay_s.ends_s()),
             "s",
         ),
-        (
-            "uncertainty.inertia_gw_s_per_hz",
-            uncertainty.inertia_gw_s_per_hz,
-            "GW s/Hz",
-        ),
-        (
-            "uncertainty.governor_gain_gw_per_hz",
-            uncertainty.governor_gain_gw_per_hz,
-            "GW/Hz",
-        ),
-        (
-            "uncertainty.damping_gw_per_hz",
-            uncertainty.damping_gw_per_hz,
-            "GW/Hz",
-        ),
-        (
-            "uncertainty.governor_time_s",
-            uncertainty.governor_time_s,
-            "s",
-        ),
-        (
-            "uncertainty.turbine_time_s",
-            uncertainty.turbine_time_s,
-            "s",
-        ),
-        ("uncertainty.lead_time_s", uncertainty.lead_time_s, "s"),
-        ("uncertainty.lag_time_s", uncertainty.lag_time_s, "s"),
     ];
     for (key, interval, unit) in intervals {
         if let Some([low, high]) = interval
