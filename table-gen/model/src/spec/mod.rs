@@ -10,7 +10,8 @@
 //! | `--set KEY=VALUE` replaces single keys | `overrides` | the same, named as an override |
 //! | a formula becomes keys | `formula` | syntax, outside the fragment, a key that disagrees |
 //! | missing keys take their defaults | `plant`, `grid`, `sampling`, `claims` | |
-//! | ranges, relations of keys | `validate`, `plant_bands`, `geometry`, `memory` | values that cannot be |
+//! | ranges, relations of keys | `validate`, `geometry`, `memory` | values that cannot be |
+//! | the plant's bands | `plant_bands` | bands that the plant is not in |
 //!
 //! What comes out is a [`Spec`]: plain numbers in the units that the key names carry.
 //! [`Spec::hash`] names it in the table's header, so that a table can be told from one made for

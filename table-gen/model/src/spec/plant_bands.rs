@@ -18,7 +18,7 @@ pub(super) struct PlantBand {
 
 impl PlantBand {
     /// Whether the parameter may be another than the plant's own.
-    pub(super) fn is_wider(&self) -> bool {
+    fn is_wider(&self) -> bool {
         self.given.is_some_and(|band| band != [self.own; 2])
     }
 
@@ -48,7 +48,7 @@ impl PlantBand {
 }
 
 /// H, 1/R_eq and D, which games and responses know in bands.
-pub(super) fn of_swing(spec: &Spec) -> [PlantBand; 3] {
+fn of_swing(spec: &Spec) -> [PlantBand; 3] {
     let (plant, bands) = (&spec.plant, &spec.uncertainty);
     [
         PlantBand {
@@ -111,6 +111,21 @@ pub(super) fn of_times(spec: &Spec) -> [PlantBand; 4] {
             bands.lag_time_s,
         ),
     ]
+}
+
+impl Spec {
+    /// Whether H, 1/R_eq or D may be another than the plant's.
+    #[must_use]
+    pub fn has_plant_band(&self) -> bool {
+        let goes = self.uncertainty.inertia_lost_s_per_hz.is_some();
+        goes || of_swing(self).iter().any(PlantBand::is_wider)
+    }
+
+    /// Whether T_G, T_t, T_1 or T_2 may be.
+    #[must_use]
+    pub fn has_time_constant_band(&self) -> bool {
+        of_times(self).iter().any(PlantBand::is_wider)
+    }
 }
 
 /// Checks all of them.

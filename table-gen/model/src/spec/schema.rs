@@ -2,7 +2,6 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::plant_bands::{self, PlantBand};
 use super::{
     BaselineSpec, ChanceSpec, ChargerSpec, Direction, FleetSpec, GridSpec, InputSpec, MeterSpec,
     MethodSpec, PlantSpec, PreferenceSpec, RequirementsSpec, SamplingSpec, TableSpec,
@@ -119,19 +118,6 @@ impl Spec {
     pub fn damping_band(&self) -> [f64; 2] {
         let nominal = self.plant.damping_gw_per_hz;
         self.uncertainty.damping_gw_per_hz.unwrap_or([nominal; 2])
-    }
-
-    /// Whether H, 1/R_eq or D may be another than the plant's.
-    #[must_use]
-    pub fn has_plant_band(&self) -> bool {
-        let goes = self.uncertainty.inertia_lost_s_per_hz.is_some();
-        goes || plant_bands::of_swing(self).iter().any(PlantBand::is_wider)
-    }
-
-    /// Whether T_G, T_t, T_1 or T_2 may be.
-    #[must_use]
-    pub fn has_time_constant_band(&self) -> bool {
-        plant_bands::of_times(self).iter().any(PlantBand::is_wider)
     }
 
     /// The deviations \[Hz\] for which games count a plant that is known in bands: from a little
