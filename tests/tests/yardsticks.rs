@@ -124,8 +124,15 @@ fn tables_of_an_invariant_plant_are_the_boxes_of_the_general_one() {
 /// is worth playing.
 #[test]
 fn two_areas_are_kept_in_the_band() {
-    let abstraction = two_areas::abstraction(1).unwrap();
-    let kernel = safety(&abstraction, &two_areas::band(1), &Unguarded, &Unwatched).unwrap();
+    let shape = two_areas::shape([1; two_areas::STATES]);
+    let abstraction = two_areas::abstraction(&shape).unwrap();
+    let kernel = safety(
+        &abstraction,
+        &two_areas::band(&shape),
+        &Unguarded,
+        &Unwatched,
+    )
+    .unwrap();
     assert!(kernel.winning > 0, "nothing stays");
     let won = |threads| {
         let pool = rayon::ThreadPoolBuilder::new()
@@ -133,7 +140,7 @@ fn two_areas_are_kept_in_the_band() {
             .build()
             .unwrap();
         pool.install(|| {
-            let (target, avoid) = (kernel.winning_set(true), two_areas::avoid(1));
+            let (target, avoid) = (kernel.winning_set(true), two_areas::avoid(&shape));
             reach(&abstraction, &target, &avoid, &Unguarded, &Unwatched).unwrap()
         })
     };

@@ -55,6 +55,7 @@ fn scorecard(changes: &[(Controller, u32)]) -> Scorecard {
     let row = |(controller, changes_most): &(Controller, u32)| Row {
         loss_gw: 1.0,
         inertia_gw_s_per_hz: 4.0,
+        plant: "H = 4".to_owned(),
         controller: *controller,
         outcome: Outcome {
             nadir_hz: 49.7,

@@ -6,6 +6,7 @@
 //! | [`spec`] | a TOML document | checked numbers |
 //! | [`logic`] | a temporal formula | requirements |
 //! | [`plant`] | parameters | the equations, once, for plain numbers and intervals |
+//! | [`plant_bands`] | a spec | the plants at the corners of its bands |
 //! | [`propagator`] | the equations | the exact step in plain numbers |
 //! | [`governor`], [`stepper`] | governors with limits | the same, not linear |
 //! | [`interval`], [`flow`] | the equations | enclosures of the flow over a time |
@@ -31,6 +32,7 @@ pub mod interval;
 pub mod logic;
 pub mod participation;
 pub mod plant;
+pub mod plant_bands;
 pub mod propagator;
 pub mod spec;
 pub mod stepper;

@@ -11,6 +11,7 @@ use super::files::write_all;
 use super::shares::Job;
 use super::{Failure, OutputArgs, SpecArgs, output, progress};
 use lab::compare::chargers::ChargersConfig;
+use lab::compare::grids::Grids;
 use lab::compare::quiet;
 use lab::compare::verdict::Verdict;
 use lab::compare::{self, CHARGERS, CHARGERS_MAX, CompareConfig, CompareError, Row, Scorecard};
@@ -43,7 +44,8 @@ pub(super) struct CompareArgs {
         allow_hyphen_values = true
     )]
     loss_gw: Band,
-    /// Inertias H [GW s/Hz], one or more; default: the spec's
+    /// Inertias H [GW s/Hz], one or more, all else as the spec's plant; default: the spec's plant,
+    /// and the corners of its bands
     #[arg(long, value_name = "H,H,...", allow_hyphen_values = true)]
     inertia: Option<Numbers>,
     /// Chargers of the fleet that droop and table run on; together they have the power of the
@@ -114,7 +116,7 @@ pub(super) fn run(args: &CompareArgs) -> Result<(), Failure> {
     let Some(by_loss) = by_loss else {
         return Ok(());
     };
-    let found = Scorecard::joined(&by_loss, config.inertias.len());
+    let found = Scorecard::joined(&by_loss, config.grids.number());
     let elapsed_s = start.elapsed().as_secs_f64();
     if let Some(path) = &args.csv {
         write_csv(path, &found)?;
@@ -139,10 +141,10 @@ pub(super) fn run(args: &CompareArgs) -> Result<(), Failure> {
     }
     output::line(verdict.sentence());
     output::line(quiet::sentence(&monitored));
-    for inertia in &config.inertias {
-        output::line(format_args!("H = {inertia} GW s/Hz; nadirs in Hz"));
+    for view in config.grids.views(&found) {
+        output::line(format_args!("{}; nadirs in Hz", view.caption));
         let mut table = output::table(&scorecard::HEADER);
-        for row in scorecard::rows(&found, *inertia) {
+        for row in scorecard::rows(&view) {
             table.add_row(row);
         }
         output::line(table);
@@ -177,10 +179,7 @@ pub(super) fn scorecard_of(
 fn config(args: &CompareArgs, spec: &Spec) -> Result<CompareConfig, Failure> {
     let [low, high] = args.loss_gw.0;
     let steps = ((high - low) / LOSS_STEP_GW + 1e-9).floor();
-    let inertias = match &args.inertia {
-        Some(numbers) => numbers.0.clone(),
-        None => vec![spec.plant.inertia_gw_s_per_hz],
-    };
+    let inertias: &[f64] = args.inertia.as_ref().map_or(&[], |numbers| &numbers.0);
     let chargers = args.chargers as f64;
     let within = [
         ("--loss-gw", low, -100.0, 100.0, "-100 to 100 GW"),
@@ -216,7 +215,10 @@ fn config(args: &CompareArgs, spec: &Spec) -> Result<CompareConfig, Failure> {
     let loss = |n: u32| ((low + LOSS_STEP_GW * f64::from(n)) * 1e9).round() / 1e9;
     Ok(CompareConfig {
         losses_gw: (0..=steps as u32).map(loss).collect(),
-        inertias,
+        grids: match &args.inertia {
+            Some(numbers) => Grids::of_inertias(spec, &numbers.0),
+            None => Grids::of(spec),
+        },
         trigger_hz: args.trigger_hz,
         duration_s: args.duration_s,
         chargers: ChargersConfig {
@@ -243,6 +245,7 @@ fn write_csv(path: &Path, found: &Scorecard) -> Result<(), Failure> {
             "changes_per_charger",
             "changes_most",
             "ripple_hz",
+            "plant",
         ])
         .map_err(|e| fail(&e))?;
     for row in &found.rows {
@@ -259,6 +262,7 @@ fn write_csv(path: &Path, found: &Scorecard) -> Result<(), Failure> {
             o.changes_per_charger,
             o.changes_most,
             o.ripple_hz,
+            row.plant.as_str(),
         );
         writer.serialize(cells).map_err(|e| fail(&e))?;
     }

@@ -78,6 +78,9 @@ pub(super) fn run(
         draws.duration_s,
         statistics.worst.seed
     ));
+    if !statistics.worst.plant.is_empty() {
+        output::line(format_args!("that one drew {}", statistics.worst.plant));
+    }
     run_tables::summary(&statistics.worst.summary);
     Ok(())
 }

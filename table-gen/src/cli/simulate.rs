@@ -14,10 +14,12 @@ use lab::simulation::beyond::Disturbances;
 use lab::simulation::beyond::file::ScenarioFile;
 use lab::simulation::closed_loop::{ClosedLoop, Estimator};
 use lab::simulation::monitor::Summary;
+use lab::simulation::monte_carlo::draws::Draws;
 use lab::simulation::recorder::History;
 use lab::simulation::scenario::Scenario;
 use lab::simulation::trajectory::{PhaseSpan, Run};
 use lab::simulation::{ControllerKind, NOMINAL_HZ, baseline};
+use model::plant::Plant;
 use model::spec::Spec;
 use synth::pipeline;
 
@@ -62,7 +64,8 @@ pub(super) struct SimulateArgs {
     /// Table to run, instead of synthesising one; it must be of this spec
     #[arg(long, value_name = "FILE")]
     table: Option<PathBuf>,
-    /// Let the firmware reconstruct the state from frequency alone
+    /// Let the firmware reconstruct the state from frequency alone; with --runs and a plant in
+    /// bands it always does
     #[arg(long)]
     observer: bool,
     /// Draw the frequency in the terminal
@@ -74,9 +77,11 @@ pub(super) struct SimulateArgs {
 }
 
 impl SimulateArgs {
-    /// How the firmware is to know the state.
-    fn estimator(&self) -> Estimator {
-        if self.observer {
+    /// How the firmware is to know the state: of a plant that is drawn nobody could tell it, and what
+    /// is proven of such plants is proven of its observer.
+    fn estimator(&self, draws: Option<&Draws>) -> Estimator {
+        let drawn = draws.is_some_and(|draws| !draws.plant.bands().is_empty());
+        if self.observer || drawn {
             Estimator::Observer
         } else {
             Estimator::FullState
@@ -132,6 +137,9 @@ struct SimulateReport<'r> {
     loss_gw: f64,
     delay_s: f64,
     duration_s: f64,
+    /// What was drawn of a plant in bands.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    plant: Option<&'r str>,
     #[serde(flatten)]
     summary: &'r Summary,
     phases: &'r [PhaseSpan],
@@ -169,6 +177,7 @@ pub(super) fn run(args: &SimulateArgs) -> Result<(), Failure> {
         Some(file) => file.disturbances(&spec).map_err(Failure::bad)?,
         None => Disturbances::of(&spec, scenario.loss_gw),
     };
+    let drawn = draws.as_ref().and_then(|draws| draws.plant(args.seed));
     let under = |respond| baseline::simulate_under(&spec, &disturbances, &scenario, respond);
     let (controller, run) = match args.controller {
         ControllerArg::None => (ControllerKind::None, under(false)),
@@ -178,8 +187,8 @@ pub(super) fn run(args: &SimulateArgs) -> Result<(), Failure> {
             let bytes = pipeline::table_bytes(&spec, args.table.as_deref(), &progress::watch)?;
             let table = TableView::parse(&bytes)
                 .map_err(|error| Failure::BadInput(format!("{error:?}")))?;
+            let estimator = args.estimator(draws.as_ref());
             if let (Some(runs @ 2..), Some(draws)) = (args.runs, &draws) {
-                let estimator = args.estimator();
                 let closed_loop =
                     ClosedLoop::new(&spec, &table, estimator).map_err(Failure::bad)?;
                 return monte_carlo::run(
@@ -191,11 +200,13 @@ pub(super) fn run(args: &SimulateArgs) -> Result<(), Failure> {
                 );
             }
             let beyond = file.as_ref().map(|_| &disturbances);
-            let run = symbolic(&spec, &table, &scenario, beyond, args.estimator())?;
+            let run = symbolic(&spec, &table, &scenario, (beyond, drawn), estimator)?;
             (ControllerKind::Symbolic, run)
         }
     };
     let outside = file.as_ref().map(|_| disturbances.outside_proof(&spec));
+    let told = draws.as_ref().zip(drawn);
+    let told = told.map(|(draws, plant)| draws.plant.told(plant));
     let report = SimulateReport {
         spec: &spec.name,
         controller,
@@ -203,6 +214,7 @@ pub(super) fn run(args: &SimulateArgs) -> Result<(), Failure> {
         loss_gw: disturbances.losses.iter().map(|loss| loss.power_gw).sum(),
         delay_s: scenario.delay_s,
         duration_s: scenario.duration_s,
+        plant: told.as_deref(),
         summary: &run.summary,
         phases: &run.phases,
         outside_proof: outside.as_deref(),
@@ -215,6 +227,9 @@ pub(super) fn run(args: &SimulateArgs) -> Result<(), Failure> {
     }
     run_tables::summary(report.summary);
     run_tables::phases(&run.phases);
+    if let Some(told) = &told {
+        output::line(format_args!("drawn: {told}"));
+    }
     for sentence in outside.iter().flatten() {
         output::line(format_args!("outside the proof: {sentence}"));
     }
@@ -225,19 +240,22 @@ pub(super) fn run(args: &SimulateArgs) -> Result<(), Failure> {
     Ok(())
 }
 
-/// One run of the firmware, on the spec's plant or beyond it.
+/// One run of the firmware, on the spec's plant, one that was drawn, or beyond both.
 fn symbolic(
     spec: &Spec,
     table: &TableView<'_>,
     scenario: &Scenario,
-    beyond: Option<&Disturbances>,
+    (beyond, drawn): (Option<&Disturbances>, Option<Plant>),
     estimator: Estimator,
 ) -> Result<Run, Failure> {
     let mut history = History::default();
     let summary = match beyond {
-        None => {
-            ClosedLoop::new(spec, table, estimator).map(|mut it| it.run(scenario, &mut history))
-        }
+        None => ClosedLoop::new(spec, table, estimator).map(|mut closed_loop| {
+            if let Some(plant) = drawn {
+                closed_loop.set_plant(plant);
+            }
+            closed_loop.run(scenario, &mut history)
+        }),
         Some(beyond) => symbolic_under(spec, table, beyond, scenario, estimator, &mut history),
     };
     let summary = summary.map_err(Failure::bad)?;

@@ -203,9 +203,15 @@ fn play_paper() -> Result<Found, Box<dyn Error>> {
 
 fn play_two_areas() -> Result<Found, Box<dyn Error>> {
     let before = usage::cpu_s();
-    let abstraction = two_areas::abstraction(1)?;
-    let kernel = safety(&abstraction, &two_areas::band(1), &Unguarded, &Unwatched)?;
-    let (target, avoid) = (kernel.winning_set(true), two_areas::avoid(1));
+    let shape = two_areas::shape([1; two_areas::STATES]);
+    let abstraction = two_areas::abstraction(&shape)?;
+    let kernel = safety(
+        &abstraction,
+        &two_areas::band(&shape),
+        &Unguarded,
+        &Unwatched,
+    )?;
+    let (target, avoid) = (kernel.winning_set(true), two_areas::avoid(&shape));
     let won = reach(&abstraction, &target, &avoid, &Unguarded, &Unwatched)?;
     Ok(found(&abstraction, kernel.winning + won.winning, before))
 }

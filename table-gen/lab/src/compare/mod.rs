@@ -1,5 +1,5 @@
 //! The scorecard: a table beside the droop, no response and the ideal one, at many losses and
-//! inertias.
+//! plants.
 //!
 //! | controller | how it responds |
 //! |---|---|
@@ -12,11 +12,13 @@
 //! |---|---|
 //! | [`chargers`] | the fleet: own clocks, own meters, own delays |
 //! | [`course`] | the grid in time, and what is measured on the way |
+//! | [`grids`] | the plants: the spec's own, other inertias, the corners of its bands |
 //! | [`quiet`] | how often a charger's command changed |
 //! | [`verdict`] | where the table loses to the droop |
 
 pub mod chargers;
 pub mod course;
+pub mod grids;
 mod outcome;
 pub mod quiet;
 pub mod verdict;
@@ -27,6 +29,7 @@ use serde::{Deserialize, Serialize};
 
 use chargers::{ChargersConfig, Kind};
 use course::Course;
+use grids::Grids;
 use model::plant::Plant;
 use model::spec::Spec;
 pub use outcome::Outcome;
@@ -76,8 +79,8 @@ impl Controller {
 pub struct CompareConfig {
     /// Lost infeeds \[GW\].
     pub losses_gw: Vec<f64>,
-    /// Inertias \[GW s/Hz\].
-    pub inertias: Vec<f64>,
+    /// Plants.
+    pub grids: Grids,
     /// Deviation at which the limit responds \[Hz\].
     pub trigger_hz: f64,
     /// Length of a run \[s\].
@@ -87,12 +90,13 @@ pub struct CompareConfig {
 }
 
 impl CompareConfig {
-    /// The scorecard of a spec at its own inertia: 0.3 to 2.8 GW by 0.1, 60 chargers, 300 s.
+    /// The scorecard of a spec on its own plant and at the corners of its bands: 0.3 to 2.8 GW by
+    /// 0.1, 60 chargers, 300 s.
     pub fn of(spec: &Spec) -> Self {
         let (first, last) = LOSSES_TENTHS;
         Self {
             losses_gw: (first..=last).map(|n| f64::from(n) / 10.0).collect(),
-            inertias: vec![spec.plant.inertia_gw_s_per_hz],
+            grids: Grids::of(spec),
             trigger_hz: TRIGGER_HZ,
             duration_s: DURATION_S,
             chargers: ChargersConfig::of(spec, CHARGERS),
@@ -107,6 +111,8 @@ pub struct Row {
     pub loss_gw: f64,
     /// H \[GW s/Hz\].
     pub inertia_gw_s_per_hz: f64,
+    /// The plant's name.
+    pub plant: String,
     /// Who controls.
     pub controller: Controller,
     /// What came of it.
@@ -114,7 +120,7 @@ pub struct Row {
     pub outcome: Outcome,
 }
 
-/// All runs: by inertia, then loss, then controller.
+/// All runs: by plant, then loss, then controller.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Scorecard {
     /// The runs.
@@ -122,14 +128,14 @@ pub struct Scorecard {
 }
 
 impl Scorecard {
-    /// The runs of one loss: by inertia, then controller.
+    /// The runs of one loss: by plant, then controller.
     pub fn of_loss(&self, loss_gw: f64) -> Vec<Row> {
         let rows = self.rows.iter().filter(|row| row.loss_gw == loss_gw);
         rows.cloned().collect()
     }
 
-    /// The scorecard of all these losses, each with the runs of so many inertias.
-    pub fn joined(by_loss: &[Vec<Row>], inertias: usize) -> Self {
+    /// The scorecard of all these losses, each with the runs of so many plants.
+    pub fn joined(by_loss: &[Vec<Row>], grids: usize) -> Self {
         let of = |at: usize| {
             let runs = by_loss
                 .iter()
@@ -137,7 +143,7 @@ impl Scorecard {
             runs.filter_map(move |mut runs| runs.nth(at)).flatten()
         };
         Self {
-            rows: (0..inertias).flat_map(of).cloned().collect(),
+            rows: (0..grids).flat_map(of).cloned().collect(),
         }
     }
 }
@@ -153,7 +159,7 @@ pub enum CompareError {
     Interrupted,
 }
 
-/// Runs every controller at every loss and inertia. `go_on` is asked before each run.
+/// Runs every controller at every loss on every plant. `go_on` is asked before each run.
 ///
 /// # Errors
 /// A table whose plant the observer cannot follow, or an interruption.
@@ -164,26 +170,23 @@ pub fn compare(
     go_on: &(dyn Fn() -> bool + Sync),
 ) -> Result<Scorecard, CompareError> {
     let mut runs = Vec::new();
-    for inertia in &config.inertias {
+    for grid in config.grids.all() {
         for loss in &config.losses_gw {
-            runs.extend(Controller::ALL.map(|controller| (*inertia, *loss, controller)));
+            runs.extend(Controller::ALL.map(|controller| (grid, *loss, controller)));
         }
     }
     let rows: Result<Vec<Row>, CompareError> = runs
         .into_par_iter()
-        .map(|(inertia, loss_gw, controller)| {
+        .map(|(grid, loss_gw, controller)| {
             if !go_on() {
                 return Err(CompareError::Interrupted);
             }
-            let plant = Plant {
-                inertia,
-                ..Plant::new(spec)
-            };
             Ok(Row {
                 loss_gw,
-                inertia_gw_s_per_hz: inertia,
+                inertia_gw_s_per_hz: grid.plant.inertia,
+                plant: grid.name.clone(),
                 controller,
-                outcome: run(spec, table, config, &plant, (loss_gw, controller))?,
+                outcome: run(spec, table, config, &grid.plant, (loss_gw, controller))?,
             })
         })
         .collect();
@@ -236,6 +239,7 @@ mod tests {
                     rows.push(Row {
                         loss_gw: loss,
                         inertia_gw_s_per_hz: inertia,
+                        plant: format!("H = {inertia}"),
                         controller,
                         outcome: outcome(rows.len() as f64),
                     });

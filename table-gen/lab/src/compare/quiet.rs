@@ -34,8 +34,8 @@ pub fn claim(spec: &Spec, config: &CompareConfig, scorecard: &Scorecard) -> Clai
         ),
         reason: worst.filter(|_| passed).map(|row| {
             format!(
-                "{} changes at a loss of {:.1} GW and H = {}",
-                row.outcome.changes_most, row.loss_gw, row.inertia_gw_s_per_hz
+                "{} changes at a loss of {:.1} GW and {}",
+                row.outcome.changes_most, row.loss_gw, row.plant
             )
         }),
     }

@@ -44,12 +44,14 @@ impl Measure {
 }
 
 /// A run in which the table is worse than the droop.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Defeat {
     /// Lost infeed \[GW\].
     pub loss_gw: f64,
     /// H \[GW s/Hz\].
     pub inertia_gw_s_per_hz: f64,
+    /// The plant's name.
+    pub plant: String,
     /// In what.
     pub measure: Measure,
     /// With the droop \[Hz, absolute\].
@@ -68,7 +70,7 @@ impl Defeat {
 /// Runs and defeats.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Verdict {
-    /// Pairs of a loss and an inertia that were compared.
+    /// Pairs of a loss and a plant that were compared.
     pub compared: usize,
     /// Every defeat, in the order of the scorecard.
     pub defeats: Vec<Defeat>,
@@ -96,6 +98,7 @@ impl Verdict {
                     (droop_hz - table_hz > grace_hz).then_some(Defeat {
                         loss_gw: table.loss_gw,
                         inertia_gw_s_per_hz: table.inertia_gw_s_per_hz,
+                        plant: table.plant.clone(),
                         measure,
                         droop_hz,
                         table_hz,
@@ -112,11 +115,11 @@ impl Verdict {
             let number = of.clone().count();
             let worst = of.max_by(|a, b| a.below_hz().total_cmp(&b.below_hz()))?;
             Some(format!(
-                "{} at {number} of {}, worst at {:.1} GW and H = {}: {:.3} against {:.3} Hz",
+                "{} at {number} of {}, worst at {:.1} GW and {}: {:.3} against {:.3} Hz",
                 measure.name(),
                 self.compared,
                 worst.loss_gw,
-                worst.inertia_gw_s_per_hz,
+                worst.plant,
                 worst.table_hz,
                 worst.droop_hz
             ))
@@ -124,7 +127,7 @@ impl Verdict {
         let found: Vec<String> = Measure::ALL.into_iter().filter_map(worst).collect();
         if found.is_empty() {
             return format!(
-                "the table is nowhere worse than the droop ({} losses and inertias)",
+                "the table is nowhere worse than the droop ({} losses and plants)",
                 self.compared
             );
         }
@@ -133,10 +136,9 @@ impl Verdict {
 }
 
 impl Scorecard {
-    /// The rows of one controller at one inertia, by loss.
-    pub fn of(&self, controller: Controller, inertia: f64) -> impl Iterator<Item = &Row> {
-        let of =
-            move |row: &&Row| row.controller == controller && row.inertia_gw_s_per_hz == inertia;
+    /// The rows of one controller on one plant, by loss.
+    pub fn of(&self, controller: Controller, plant: &str) -> impl Iterator<Item = &Row> {
+        let of = move |row: &&Row| row.controller == controller && row.plant == plant;
         self.rows.iter().filter(of)
     }
 
@@ -160,6 +162,7 @@ mod tests {
         Row {
             loss_gw: 1.0,
             inertia_gw_s_per_hz: 4.0,
+            plant: "H = 4".to_owned(),
             controller,
             outcome: Outcome {
                 nadir_hz,

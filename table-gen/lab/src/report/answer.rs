@@ -112,7 +112,7 @@ fn against_droop(spec: &Spec, config: &CompareConfig, found: &Scorecard) -> Stri
     };
     let standings = Measure::ALL.map(|measure| standing(measure, found, grace_hz));
     format!(
-        "{} These are runs, at the losses of the scorecard; what is proven is proven for {proven}.",
+        "{} These are runs, at the losses and on the plants of the scorecard; what is proven is proven for {proven}.",
         standings.join(" ")
     )
 }

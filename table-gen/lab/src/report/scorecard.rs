@@ -3,13 +3,15 @@
 use super::figure::{Axis, Curve, Figure};
 use super::palette::Colour;
 use super::section::{DataTable, Section};
+use crate::compare::grids::View;
 use crate::compare::verdict::{Measure, Verdict};
 use crate::compare::{CompareConfig, Controller, Row, Scorecard};
 
 /// Room above and below the curves \[Hz\].
 const MARGIN_HZ: f64 = 0.02;
 
-/// The scorecard of a spec, with two figures for each inertia.
+/// The scorecard of a spec, with two figures for each plant that was asked for, and two for the
+/// worst of its bands.
 pub fn scorecard(spec: &str, config: &CompareConfig, found: &Scorecard) -> Section {
     let fleet = &config.chargers;
     let verdict = Verdict::of(found, fleet);
@@ -25,22 +27,22 @@ pub fn scorecard(spec: &str, config: &CompareConfig, found: &Scorecard) -> Secti
             config.trigger_hz,
             config.duration_s
         ));
-    for inertia in &config.inertias {
-        section.tables.push(table(found, *inertia));
+    for view in config.grids.views(found) {
+        section.tables.push(table(&view));
     }
     section.figures = figures(spec, config, found);
     section
 }
 
-/// The figures of the scorecard: for each inertia the nadir, then the final frequency.
+/// The figures of the scorecard: for each of its views the nadir, then the final frequency.
 pub fn figures(spec: &str, config: &CompareConfig, found: &Scorecard) -> Vec<Figure> {
-    let inertias = config.inertias.iter();
-    inertias
-        .flat_map(|inertia| Measure::ALL.map(|measure| figure(spec, measure, *inertia, found)))
+    let views = config.grids.views(found).into_iter();
+    views
+        .flat_map(|view| Measure::ALL.map(|measure| figure(spec, measure, &view)))
         .collect()
 }
 
-fn figure(spec: &str, measure: Measure, inertia: f64, found: &Scorecard) -> Figure {
+fn figure(spec: &str, measure: Measure, view: &View) -> Figure {
     let name = measure.name();
     let curves = Controller::ALL.map(|controller| Curve {
         name: controller.name().to_owned(),
@@ -50,8 +52,8 @@ fn figure(spec: &str, measure: Measure, inertia: f64, found: &Scorecard) -> Figu
             Controller::Table => Colour::Symbolic,
             Controller::Limit => Colour::Extra,
         },
-        points: found
-            .of(controller, inertia)
+        points: view.rows[controller as usize]
+            .iter()
             .map(|row| (row.loss_gw, measure.of(row)))
             .collect(),
     });
@@ -64,8 +66,8 @@ fn figure(spec: &str, measure: Measure, inertia: f64, found: &Scorecard) -> Figu
     let (low, high) = ends(&mut points().map(|(_, value)| *value));
     let (first, last) = ends(&mut points().map(|(loss, _)| *loss));
     Figure {
-        id: format!("{spec}-compare-{name}-H{inertia}"),
-        title: format!("{spec}: {name} frequency over the loss, H = {inertia} GW s/Hz"),
+        id: format!("{spec}-compare-{name}-{}", view.id),
+        title: format!("{spec}: {name} frequency over the loss, {}", view.caption),
         description: format!(
             "The {name} frequency after losses of {first} to {last} GW with no response, with the droop, with the table and at \
              the limit."
@@ -86,9 +88,9 @@ fn figure(spec: &str, measure: Measure, inertia: f64, found: &Scorecard) -> Figu
     }
 }
 
-fn table(found: &Scorecard, inertia: f64) -> DataTable {
-    let mut table = DataTable::new(format!("H = {inertia} GW s/Hz"), &HEADER);
-    for cells in rows(found, inertia) {
+fn table(view: &View) -> DataTable {
+    let mut table = DataTable::new(view.caption.clone(), &HEADER);
+    for cells in rows(view) {
         table.row(cells);
     }
     table
@@ -109,11 +111,10 @@ pub const HEADER: [&str; 11] = [
     "ripple mHz",
 ];
 
-/// The scorecard at one inertia as texts, a row a loss: four nadirs, then what else the table is
+/// A view of the scorecard as texts, a row a loss: four nadirs, then what else the table is
 /// judged by.
-pub fn rows(found: &Scorecard, inertia: f64) -> Vec<[String; HEADER.len()]> {
-    let of = |controller| found.of(controller, inertia);
-    let [none, droop, table, limit] = Controller::ALL.map(of);
+pub fn rows(view: &View) -> Vec<[String; HEADER.len()]> {
+    let [none, droop, table, limit] = view.rows.each_ref().map(|rows| rows.iter());
     let hz = |value: f64| format!("{value:.3}");
     let row = |(((none, droop), table), limit): (((&Row, &Row), &Row), &Row)| {
         let (droop, table) = (&droop.outcome, (&table.outcome, table.loss_gw));

@@ -101,6 +101,12 @@ impl<'t> ClosedLoop<'t> {
         })
     }
 
+    /// Runs from now on are on this plant; the firmware and its observer know nothing of it.
+    pub fn set_plant(&mut self, plant: Plant) {
+        self.plant = plant;
+        self.tick_step = Propagator::new(&plant, self.tick_s);
+    }
+
     /// Whole ticks of a delay, and the lengths of the parts of a tick.
     pub fn parts(&self, scenario: &Scenario) -> (usize, PartLengths) {
         let whole = (scenario.delay_s / self.tick_s + DUST_S).floor();
@@ -110,7 +116,7 @@ impl<'t> ClosedLoop<'t> {
         (whole as usize, parts)
     }
 
-    /// One run on the spec's plant.
+    /// One run on the spec's plant, or on the one that was set.
     pub fn run(&mut self, scenario: &Scenario, recorder: &mut impl Recorder) -> Summary {
         let (_, parts) = self.parts(scenario);
         let (loss, initial) = (scenario.loss_gw, scenario.initial);

@@ -12,7 +12,10 @@
 //!
 //! The game: reach and stay. Both frequencies are kept in a band for ever, and the band is reached
 //! from wherever that is certain, never below containment. The widths of the grid are a parameter,
-//! so that the example scales.
+//! so that the example scales. No charger measures all five states: [`observer`] has what two
+//! frequencies tell of them, and the game on that.
+
+pub mod observer;
 
 use crate::abstraction::affine::{
     AbstractionError, AffineAbstraction, AffineInput, Drift, Errors, Growth,
@@ -76,9 +79,9 @@ pub const BAND: [f64; 2] = [-0.3, 0.1];
 /// Frequencies never fall below this \[Hz\].
 pub const CONTAINMENT: f64 = -0.45;
 
-/// The grid, each axis cut into `scale` times as many cells.
-pub fn shape(scale: u32) -> GridShape<STATES> {
-    let count = COUNT.map(|n| n * scale);
+/// The grid, each axis cut into so many times as many cells.
+pub fn shape(scales: [u32; STATES]) -> GridShape<STATES> {
+    let count = std::array::from_fn(|d| COUNT[d] * scales[d]);
     GridShape {
         lower: LOWER,
         width: std::array::from_fn(|d| (UPPER[d] - LOWER[d]) / f64::from(count[d])),
@@ -115,35 +118,45 @@ fn net_power(area: &Area, level: usize) -> Interval {
     Interval::point(area.fleet) * u - Interval::hull(area.loss[0], area.loss[1])
 }
 
-/// The abstraction on the grid of a scale. Input `v + LEVELS u` has level v in area 1 and u in area
+/// Net powers of both areas \[GW\] under an input: `v + LEVELS u` has level v in area 1 and u in area
 /// 2.
-///
-/// # Errors
-/// As [`AffineAbstraction::new`].
-pub fn abstraction(scale: u32) -> Result<AffineAbstraction<STATES>, AbstractionError> {
+fn net_powers(input: usize) -> [Interval; 2] {
+    [
+        net_power(&AREAS[0], input % LEVELS),
+        net_power(&AREAS[1], input / LEVELS),
+    ]
+}
+
+/// What each input adds to the state over a period, for the net powers that it may give, and so much
+/// more on each axis.
+fn drifts(powers: impl Fn(usize) -> [Interval; 2], more: [f64; STATES]) -> Vec<Drift<STATES>> {
     let (a, b) = matrices();
     // The engine's own drives have one direction; here each input adds the response to two.
     let gammas = b.map(|b| Flow::over(&a, &b, PERIOD_S).gamma);
     let absolute = b.map(|b| absolute_integral(&a, &b, PERIOD_S));
-    let mut drifts = Vec::new();
-    for input in 0..LEVELS * LEVELS {
-        let powers = [
-            net_power(&AREAS[0], input % LEVELS),
-            net_power(&AREAS[1], input / LEVELS),
-        ];
+    let drift = |input| {
         let mut drift = Drift {
             centre: [Interval::ZERO; STATES],
-            radius: [0.0; STATES],
+            radius: more,
         };
         for d in 0..STATES {
-            for (i, power) in powers.iter().enumerate() {
+            for (i, power) in powers(input).iter().enumerate() {
                 drift.centre[d] = drift.centre[d] + gammas[i][d] * Interval::point(power.mid());
                 let spread = (absolute[i][d] * power.radius()).next_up();
                 drift.radius[d] = (drift.radius[d] + spread).next_up();
             }
         }
-        drifts.push(drift);
-    }
+        drift
+    };
+    (0..LEVELS * LEVELS).map(drift).collect()
+}
+
+/// The abstraction on a grid for what each input adds.
+fn abstraction_of(
+    shape: &GridShape<STATES>,
+    drifts: &[Drift<STATES>],
+) -> Result<AffineAbstraction<STATES>, AbstractionError> {
+    let (a, b) = matrices();
     let input = AffineInput {
         a,
         b: b[0],
@@ -154,18 +167,27 @@ pub fn abstraction(scale: u32) -> Result<AffineAbstraction<STATES>, AbstractionE
         after: [0.0; STATES],
     };
     AffineAbstraction::with_drifts(
-        shape(scale),
+        *shape,
         &vec![input; drifts.len()],
         PERIOD_S,
         Growth::ExactLinear,
         errors,
-        Some(&drifts),
+        Some(drifts),
     )
 }
 
+/// The abstraction on a grid, with an input for each pair of levels.
+///
+/// # Errors
+/// As [`AffineAbstraction::new`].
+pub fn abstraction(
+    shape: &GridShape<STATES>,
+) -> Result<AffineAbstraction<STATES>, AbstractionError> {
+    abstraction_of(shape, &drifts(net_powers, [0.0; STATES]))
+}
+
 /// Cells chosen by the intervals of both frequencies.
-fn by_frequencies(scale: u32, choose: impl Fn((f64, f64)) -> bool) -> BitSet {
-    let shape = shape(scale);
+fn by_frequencies(shape: &GridShape<STATES>, choose: impl Fn((f64, f64)) -> bool) -> BitSet {
     let chosen: [Vec<bool>; 2] = std::array::from_fn(|d| {
         (0..shape.count[d])
             .map(|i| choose(shape.interval(d, i)))
@@ -186,13 +208,27 @@ const ROUNDING_HZ: f64 = 1e-9;
 
 /// Cells with both frequencies in the band. An end within a nanohertz of the band's counts as on
 /// it: the claim is for a band wider by so much.
-pub fn band(scale: u32) -> BitSet {
-    by_frequencies(scale, |(low, high)| {
-        low >= BAND[0] - ROUNDING_HZ && high <= BAND[1] + ROUNDING_HZ
+pub fn band(shape: &GridShape<STATES>) -> BitSet {
+    band_within(shape, 0.0)
+}
+
+/// Cells with both frequencies in the band and not nearer to its ends than this \[Hz\].
+fn band_within(shape: &GridShape<STATES>, margin_hz: f64) -> BitSet {
+    let margin_hz = margin_hz - ROUNDING_HZ;
+    by_frequencies(shape, |(low, high)| {
+        low >= BAND[0] + margin_hz && high <= BAND[1] - margin_hz
     })
 }
 
 /// Cells of which any part lies below containment, less a nanohertz.
-pub fn avoid(scale: u32) -> BitSet {
-    by_frequencies(scale, |(low, _)| low >= CONTAINMENT - ROUNDING_HZ).complement()
+pub fn avoid(shape: &GridShape<STATES>) -> BitSet {
+    avoid_below(shape, 0.0)
+}
+
+/// Cells of which any part is not so far above containment \[Hz\].
+fn avoid_below(shape: &GridShape<STATES>, margin_hz: f64) -> BitSet {
+    by_frequencies(shape, |(low, _)| {
+        low >= CONTAINMENT + margin_hz - ROUNDING_HZ
+    })
+    .complement()
 }

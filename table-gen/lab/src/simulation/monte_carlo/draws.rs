@@ -1,4 +1,4 @@
-//! What a Monte Carlo run draws: one scenario from one seed.
+//! What a Monte Carlo run draws: one scenario, and one plant if the spec has bands, from one seed.
 
 use rand::{Rng, SeedableRng};
 use rand_pcg::Pcg64;
@@ -6,8 +6,12 @@ use serde::Serialize;
 
 use crate::simulation::chance::{between, unit};
 use crate::simulation::scenario::{Scenario, ScenarioError};
-use model::plant::STATES;
+use model::plant::{Plant, STATES};
+use model::plant_bands::{Band, PlantBands};
 use model::spec::Spec;
+
+/// Sets the draws of a plant apart from those of the scenario of the same seed.
+const PLANT_STREAM: u128 = 0x50_4c41_4e54;
 
 /// Bands from which each run draws; all uniform.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -28,6 +32,13 @@ pub struct Draws {
     pub event_offset_s: f64,
     /// Length of a run \[s\].
     pub duration_s: f64,
+    /// The plant: each parameter that the spec has in a band, once a run.
+    #[serde(serialize_with = "bands")]
+    pub plant: PlantBands,
+}
+
+fn bands<S: serde::Serializer>(plant: &PlantBands, serializer: S) -> Result<S::Ok, S::Error> {
+    <[Band]>::serialize(plant.bands(), serializer)
 }
 
 impl Draws {
@@ -43,6 +54,7 @@ impl Draws {
             initial_upper: uncertainty.initial.upper,
             event_offset_s: spec.sampling.watch_s,
             duration_s: spec.requirements.horizon_s.unwrap_or(120.0),
+            plant: PlantBands::of(spec),
         }
     }
 
@@ -66,6 +78,16 @@ impl Draws {
             seed: random.next_u64(),
             initial,
         }
+    }
+
+    /// The plant of a seed, if the spec's lies in bands. It has draws of its own, so that scenarios
+    /// are the same with bands and without.
+    pub fn plant(&self, seed: u64) -> Option<Plant> {
+        if self.plant.bands().is_empty() {
+            return None;
+        }
+        let mut random = Pcg64::new(u128::from(seed), PLANT_STREAM);
+        Some(self.plant.at(|band| between(&mut random, band.within)))
     }
 
     /// Checks every number.

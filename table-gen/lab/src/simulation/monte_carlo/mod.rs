@@ -56,6 +56,8 @@ impl Outcome {
 pub struct KeptRun {
     /// Replay it with `--runs 1 --seed` this.
     pub seed: u64,
+    /// What was drawn of the plant: `H = 3.1, D = 0.7`; empty where the spec knows it.
+    pub plant: String,
     /// What it is judged by.
     #[serde(flatten)]
     pub summary: Summary,
@@ -101,8 +103,7 @@ pub fn run(
         if stopped.load(Ordering::Relaxed) {
             return None;
         }
-        let scenario = draws.scenario(seed.wrapping_add(index as u64));
-        let summary = closed_loop.run(&scenario, &mut ());
+        let summary = run_one(closed_loop, draws, seed.wrapping_add(index as u64));
         if !done() {
             stopped.store(true, Ordering::Relaxed);
         }
@@ -128,9 +129,9 @@ pub fn run(
         })
         .map_or(0, |(index, _)| index);
     let worst_seed = seed.wrapping_add(worst as u64);
-    let summary = closed_loop
-        .clone()
-        .run(&draws.scenario(worst_seed), &mut ());
+    let summary = run_one(&mut closed_loop.clone(), draws, worst_seed);
+    let plant = draws.plant(worst_seed);
+    let plant = plant.map_or_else(String::new, |plant| draws.plant.told(plant));
     Some(Statistics {
         runs,
         seed,
@@ -143,7 +144,16 @@ pub fn run(
         entered_inner_s: Quantiles::of(outcomes.iter().map(|o| o.entered_inner_s)),
         worst: KeptRun {
             seed: worst_seed,
+            plant,
             summary,
         },
     })
+}
+
+/// The run of a seed.
+fn run_one(closed_loop: &mut ClosedLoop<'_>, draws: &Draws, seed: u64) -> Summary {
+    if let Some(plant) = draws.plant(seed) {
+        closed_loop.set_plant(plant);
+    }
+    closed_loop.run(&draws.scenario(seed), &mut ())
 }
