@@ -61,6 +61,7 @@ fn find() -> Findings {
         reachable_cells: 0,
         counterexample: None,
         hostile_share: None,
+        plant: Vec::new(),
         spec_hash: String::new(),
         table_spec_hash: String::new(),
         table_sha256: String::new(),

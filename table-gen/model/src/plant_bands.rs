@@ -48,6 +48,15 @@ impl Parameter {
         }
     }
 
+    /// Its unit.
+    pub const fn unit(self) -> &'static str {
+        match self {
+            Self::Inertia => "GW s/Hz",
+            Self::GovernorGain | Self::Damping => "GW/Hz",
+            Self::GovernorTime | Self::TurbineTime | Self::LeadTime | Self::LagTime => "s",
+        }
+    }
+
     /// Its place in a plant.
     pub const fn of(self, plant: &mut Plant) -> &mut f64 {
         match self {
@@ -110,6 +119,11 @@ impl PlantBands {
         &self.bands
     }
 
+    /// Whether a parameter lies in a band.
+    pub fn holds(&self, parameter: Parameter) -> bool {
+        self.bands.iter().any(|band| band.parameter == parameter)
+    }
+
     /// The spec's own plant with each parameter in a band at the value that is said of its band.
     pub fn at(&self, mut value: impl FnMut(&Band) -> f64) -> Plant {
         let mut plant = self.own;
@@ -119,22 +133,31 @@ impl PlantBands {
         plant
     }
 
+    /// Each band in words: `H anywhere in 2.8 to 5 GW s/Hz`.
+    pub fn words(&self) -> Vec<String> {
+        let words = self.bands.iter().map(|band| {
+            let ([low, high], parameter) = (band.within, band.parameter);
+            let (symbol, unit) = (parameter.symbol(), parameter.unit());
+            format!("{symbol} anywhere in {low} to {high} {unit}")
+        });
+        words.collect()
+    }
+
     /// The plants at all corners: 2ⁿ of n bands, the lowest first; none without a band.
     pub fn corners(&self) -> impl Iterator<Item = Plant> {
         let number = self.bands.len();
         let corners = if number == 0 { 0 } else { 1u32 << number };
         (0..corners).map(move |corner| {
-            let mut bit = 0;
+            let mut rest = corner;
             self.at(|band| {
-                let end = corner >> bit & 1;
-                bit += 1;
+                let end = rest % 2;
+                rest /= 2;
                 band.within[end as usize]
             })
         })
     }
 
-    /// What of a plant lies in bands, for people, to a millionth: `H = 2.8, D = 0.5`; empty without a
-    /// band.
+    /// What of a plant lies in bands, to a millionth: `H = 2.8, D = 0.5`; empty without a band.
     pub fn told(&self, mut plant: Plant) -> String {
         let told = self.bands.iter().map(|band| {
             let value = (*band.parameter.of(&mut plant) * 1e6).round() / 1e6;
@@ -200,5 +223,13 @@ mod tests {
             assert_eq!(back, own);
         }
         assert_eq!(bands.told(corners[2]), "H = 2.8, 1/R_eq = -4, T_2 = 9.6");
+        assert_eq!(
+            bands.words(),
+            [
+                "H anywhere in 2.8 to 5 GW s/Hz",
+                "1/R_eq anywhere in -6 to -4 GW/Hz",
+                "T_2 anywhere in 9.6 to 14.4 s"
+            ]
+        );
     }
 }

@@ -25,6 +25,9 @@ pub struct Verdict {
     /// Share of the chargers that was assumed to do as it likes; absent: none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub hostile_share: Option<f64>,
+    /// What of the plant lies in bands, in words; empty where the spec knows it.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub plant: Vec<String>,
     /// Hash of the spec (as in the table's header), hexadecimal.
     pub spec_hash: String,
     /// Hash of the spec that the table was made for, hexadecimal.

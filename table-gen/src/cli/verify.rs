@@ -154,6 +154,9 @@ pub(super) fn print(verdict: &Verdict) {
         verdict.method,
         output::grouped(verdict.reachable_cells as usize),
     ));
+    for band in &verdict.plant {
+        output::line(format_args!("unknown: {band}"));
+    }
     if let Some(share) = verdict.hostile_share {
         output::line(format_args!(
             "assumed: {} % of the chargers do as they like",

@@ -87,6 +87,7 @@ pub use error::VerifyError;
 pub use prediction_error::{PredictionError, prediction_error};
 
 use model::hex::hex;
+use model::plant_bands::PlantBands;
 use model::verdict::{Claim, ClaimName, Counterexample, Counts, Method, Verdict};
 
 use firmware::table::TableView;
@@ -222,6 +223,7 @@ pub fn verify_assuming(
         reachable_cells,
         counterexample: failures.first().cloned(),
         hostile_share: spec.uncertainty.hostile_share,
+        plant: PlantBands::of(spec).words(),
         spec_hash: hex(&made_for.hash()),
         table_spec_hash: hex(&header.spec_hash),
         table_sha256: hex(&Sha256::digest(bytes)),
@@ -303,6 +305,7 @@ fn verdict_of_response(
         reachable_cells: 0,
         counterexample: None,
         hostile_share: spec.uncertainty.hostile_share,
+        plant: PlantBands::of(spec).words(),
         spec_hash: hex(&made_for.hash()),
         table_spec_hash: hex(&header.spec_hash),
         table_sha256: hex(&Sha256::digest(table.bytes())),

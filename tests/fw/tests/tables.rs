@@ -172,6 +172,7 @@ fn what_is_proven_is_read_from_the_verdict_on_these_bytes() {
         reachable_cells: 0,
         counterexample: None,
         hostile_share: None,
+        plant: Vec::new(),
         spec_hash: String::new(),
         table_spec_hash: String::new(),
         table_sha256: hex(&Sha256::digest(&bytes)),

@@ -6,6 +6,7 @@ use super::section::{DataTable, Section};
 use crate::compare::verdict::{Measure, grace_hz};
 use crate::compare::{CompareConfig, Controller, Scorecard};
 use crate::simulation::NOMINAL_HZ;
+use model::plant_bands::{Parameter, PlantBands};
 use model::spec::{LossProfile, Spec};
 use model::verdict::Verdict;
 
@@ -85,16 +86,12 @@ fn hypotheses(spec: &Spec) -> String {
     if uncertain.own_clocks {
         parts.push("each charger with its own clock".to_owned());
     }
-    parts.push(match uncertain.inertia_gw_s_per_hz {
-        Some([low, high]) => {
-            let [low, high] = [low, high].map(digits::four);
-            format!("H anywhere in {low} to {high} GW s/Hz")
-        }
-        None => format!(
-            "H = {} GW s/Hz",
-            digits::four(spec.plant.inertia_gw_s_per_hz)
-        ),
-    });
+    let bands = PlantBands::of(spec);
+    if !bands.holds(Parameter::Inertia) {
+        let inertia = digits::four(spec.plant.inertia_gw_s_per_hz);
+        parts.push(format!("H = {inertia} GW s/Hz"));
+    }
+    parts.extend(bands.words());
     format!(
         "For: {}; all else exactly as the spec says.",
         parts.join(", ")

@@ -201,6 +201,7 @@ mod tests {
                 real,
             }),
             hostile_share: None,
+            plant: Vec::new(),
             spec_hash: String::new(),
             table_spec_hash: String::new(),
             table_sha256: String::new(),

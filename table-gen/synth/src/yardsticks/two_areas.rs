@@ -118,8 +118,7 @@ fn net_power(area: &Area, level: usize) -> Interval {
     Interval::point(area.fleet) * u - Interval::hull(area.loss[0], area.loss[1])
 }
 
-/// Net powers of both areas \[GW\] under an input: `v + LEVELS u` has level v in area 1 and u in area
-/// 2.
+/// Net powers of both areas \[GW\] under an input: `v + LEVELS u` is level v in area 1, u in 2.
 fn net_powers(input: usize) -> [Interval; 2] {
     [
         net_power(&AREAS[0], input % LEVELS),
@@ -127,8 +126,8 @@ fn net_powers(input: usize) -> [Interval; 2] {
     ]
 }
 
-/// What each input adds to the state over a period, for the net powers that it may give, and so much
-/// more on each axis.
+/// What each input adds to the state over a period, for the net powers that it may give, and so
+/// much more on each axis.
 fn drifts(powers: impl Fn(usize) -> [Interval; 2], more: [f64; STATES]) -> Vec<Drift<STATES>> {
     let (a, b) = matrices();
     // The engine's own drives have one direction; here each input adds the response to two.

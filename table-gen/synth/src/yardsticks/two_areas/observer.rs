@@ -19,7 +19,7 @@
 //! ```
 //!
 //! The sum is taken up to a power N whose rows' absolute sums are at most ρ < 1. With S the part up
-//! to there, e is M^N of an earlier e and what S bounds, so that the largest entry of |e| is at most that of S
+//! to there, e is M^N of an earlier e and what S bounds. So the largest of |e| is at most that of S
 //! over 1 - ρ, and each entry at most its own of S and its row of |M^N| times that. Any L of which
 //! the sum ends is sound; [`GAINS`] are those of a Kalman filter for these bounds, to two digits.
 //!
