@@ -7,6 +7,7 @@
 //! | [`abstraction`] | plant and grid | boxes of successor cells |
 //! | [`game`] | an abstraction and a target | allowed inputs and ranks |
 //! | [`drives`], [`problem`] | a spec | everything derived from it, once |
+//! | `chain_times` | time constants in bands | how far the governors' output is off |
 //! | [`delay`] | a delay of the commands | what the games know then, and the device's prediction |
 //! | [`changeover`] | a delay that is a range | what some chargers' old command does to a period |
 //! | [`checkpoint`] | a game | a file to go on from |
@@ -24,6 +25,7 @@
 
 pub mod abstraction;
 pub mod budget;
+mod chain_times;
 pub mod changeover;
 pub mod checkpoint;
 pub mod chosen;

@@ -54,6 +54,7 @@
 //! ```
 
 mod cellset;
+mod chain_times;
 mod changeover;
 mod claims;
 mod closed_cells;

@@ -1,27 +1,30 @@
-//! Laws by games on a plant whose H, 1/R_eq and D lie in bands: the nominal plant with something
-//! added to its net power.
+//! Laws by games on a plant that lies in bands: the nominal plant with something added to its net
+//! power.
 //!
 //! Write K for 1/R_eq, K₀, H₀, D₀ for the nominal values, κ = K/K₀, and N for the power that
-//! accelerates the grid. K is constant. The governor chain is linear in its gain, so that
-//! q = (g, l, p)/κ obeys the nominal chain,
+//! accelerates the grid. K and the time constants do not move. The governor chain is linear in its
+//! gain, so that p is κ times what the real chain would give with the gain K₀. The nominal chain
+//! gives q of the same f,
 //!
 //! ```text
 //! q_g' = (K₀ f - q_g)/T_G    q_l' = (q_g + T_1 q_g' - q_l)/T_2    q_p' = (q_l - q_p)/T_t
-//! 2H f' = N = κ q_p + v - D f
+//! 2H f' = N = κ (q_p + δ) + v - D f
 //! ```
 //!
-//! and it is q, not (g, l, p), that the device's observer computes: it knows K₀ alone. So (f, q)
-//! obeys the nominal equations with the net power v + e,
+//! where δ is what other time constants make of it, which [`chain_times`] bounds; without, q is
+//! (g, l, p)/κ. It is q that the device's observer computes: it knows K₀ and the nominal times
+//! alone. So (f, q) obeys the nominal equations with the net power v + e,
 //!
 //! ```text
-//! e = (H₀/H) N - (q_p + v - D₀ f) = (κ - 1) q_p - (D - D₀) f + (H₀/H - 1) N
+//! e = (H₀/H) N - (q_p + v - D₀ f) = (κ - 1) q_p + κ δ - (D - D₀) f + (H₀/H - 1) N
 //! ```
 //!
 //! and every set of this package, in which the net power moves within an interval as it likes,
 //! holds it once the interval is wider by the range of e; H and D may move too. The spec's
 //! `initial` and `measurement` are then about q.
 //!
-//! **The range of e** rests on f being in a range F since the event. q_g stays in any interval that
+//! **The range of e** rests on f being in a range F since the event, and, where time constants are
+//! in bands, on its having been there before. q_g stays in any interval that
 //! holds K₀ F and q_g(0). q_l is drawn to `(T_1/T_G) K₀ f + (1 - T_1/T_G) q_g`, so it stays in any
 //! interval that holds this and q_l(0); q_p likewise follows q_l.
 //!
@@ -34,6 +37,8 @@ use model::interval::Interval;
 use model::plant::{Plant, STATES};
 use model::spec::Spec;
 
+use crate::chain_times;
+
 /// By how much f must end inside the range \[µHz\].
 const INSIDE: f64 = 1.0;
 
@@ -44,6 +49,8 @@ pub(crate) struct Premise {
     f: Interval,
     /// Of q_p \[kW\], for such f.
     q: Interval,
+    /// Of δ \[kW\].
+    apart: Interval,
     /// κ - 1.
     gain: Interval,
     /// D - D₀ \[kW/µHz\].
@@ -81,6 +88,8 @@ impl Premise {
         Some(Self {
             f,
             q: l.join(initial[AXIS_P]),
+            // From rest on, f was 0.
+            apart: chain_times::apart(spec, asked.join(Interval::ZERO), initial),
             gain: governor_gain / point(plant.governor_gain) - Interval::ONE,
             damping: damping - point(plant.damping),
             whole_damping: damping,
@@ -91,8 +100,9 @@ impl Premise {
     /// v + e for a net power v \[kW\].
     pub(crate) fn widened(&self, v: Interval) -> Interval {
         let kappa = self.gain + Interval::ONE;
-        let accelerating = kappa * self.q + v - self.whole_damping * self.f;
-        v + self.gain * self.q - self.damping * self.f + self.lighter * accelerating
+        let accelerating = kappa * (self.q + self.apart) + v - self.whole_damping * self.f;
+        v + self.gain * self.q + kappa * self.apart - self.damping * self.f
+            + self.lighter * accelerating
     }
 
     /// Why an exploration in which f was between two ends \[µHz\] says nothing, if f may leave the
@@ -101,8 +111,8 @@ impl Premise {
         let inside = low >= self.f.low + INSIDE && high <= self.f.high - INSIDE;
         (!inside).then(|| {
             format!(
-                "the bands of H, 1/R_eq and D are counted for f from {:.4} to {:.4} Hz, and f may \
-                 range from {:.4} to {:.4} Hz",
+                "the plant's bands are counted for f from {:.4} to {:.4} Hz, and f may range \
+                 from {:.4} to {:.4} Hz",
                 self.f.low / 1e6,
                 self.f.high / 1e6,
                 low / 1e6,

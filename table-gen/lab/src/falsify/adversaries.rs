@@ -54,6 +54,15 @@ pub(super) fn drawn_plant(random: &mut Random, spec: &Spec) -> Plant {
     }
 }
 
+/// Time constants within a spec's bands.
+pub(super) fn draw_times(random: &mut Random, spec: &Spec, plant: &mut Plant) {
+    let [governor, turbine, lead, lag] = spec.time_constant_bands();
+    plant.governor_time = within(random, governor);
+    plant.turbine_time = within(random, turbine);
+    plant.lead_time = within(random, lead);
+    plant.lag_time = within(random, lag);
+}
+
 /// Everything constant, at a chosen point of its range.
 #[derive(Debug, Clone, Copy)]
 pub struct Constant {

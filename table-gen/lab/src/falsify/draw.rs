@@ -3,7 +3,7 @@
 use model::plant::{Plant, STATES};
 use model::spec::{LossProfile, Spec};
 
-use super::adversaries::{Random, drawn_plant, within};
+use super::adversaries::{Random, draw_times, drawn_plant, within};
 
 /// Most chargers of a crowd.
 pub(super) const MEMBERS_MOST: u64 = 200;
@@ -110,15 +110,7 @@ impl Draw {
         let members = (least + random.number() % (MEMBERS_MOST - least + 1)) as usize;
         let seed = random.number();
         // Last, so that specs without such bands are drawn as they were.
-        let [governor, turbine, lead, lag] = spec.time_constant_bands();
-        for (time, band) in [
-            (&mut plant.governor_time, governor),
-            (&mut plant.turbine_time, turbine),
-            (&mut plant.lead_time, lead),
-            (&mut plant.lag_time, lag),
-        ] {
-            *time = within(&mut random, band);
-        }
+        draw_times(&mut random, spec, &mut plant);
         Self {
             plant,
             initial,

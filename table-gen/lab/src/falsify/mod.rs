@@ -35,6 +35,7 @@ mod draw;
 mod fleet;
 mod found;
 mod judge;
+mod observer;
 mod readers;
 pub mod trajectory;
 mod under_way;
@@ -43,7 +44,7 @@ pub mod witness;
 use firmware::table::{TableError, TableView};
 use model::spec::Spec;
 
-use adversaries::{BangBang, Constant, Random, Resonant, drawn_plant};
+use adversaries::{BangBang, Constant, Random, Resonant, draw_times, drawn_plant};
 pub use found::Falsification;
 use trajectory::{Adversary, Breach, Trajectories};
 use witness::real_path;
@@ -129,7 +130,9 @@ impl<'a> Search<'a> {
         /// Sets these draws apart from the adversary's.
         const PLANT: u64 = 0x706c_616e_7400_0000;
         self.spec.has_plant_band().then(|| {
-            let plant = drawn_plant(&mut Random::new(draw ^ PLANT), self.spec);
+            let mut random = Random::new(draw ^ PLANT);
+            let mut plant = drawn_plant(&mut random, self.spec);
+            draw_times(&mut random, self.spec, &mut plant);
             Trajectories::on(self.table, self.spec, plant)
         })
     }

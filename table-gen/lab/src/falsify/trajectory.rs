@@ -15,6 +15,7 @@ use model::propagator::Propagator;
 use model::spec::Spec;
 use model::verdict::ClaimName;
 
+use super::observer::{self, Chain, ChainStep};
 use super::under_way::{Command, Lateness, Part, UnderWay};
 
 /// Pieces of a tick at which the frequency between ticks is looked at.
@@ -76,10 +77,14 @@ pub struct Trajectories<'a> {
     /// What the device's observer computes of g, l and p, which knows the plant's own governor gain
     /// alone, as a share of them.
     observed: [f64; STATES],
+    /// The plant that the observer knows, where it has other time constants.
+    nominal: Option<Plant>,
     tick_s: f64,
     lateness: Lateness,
     /// The plant over 1..=PIECES pieces of each part of a tick.
     pieces: Vec<Vec<Propagator>>,
+    /// The observer's chain over each part of a tick, where it is not the plant's.
+    chains: Vec<Option<ChainStep>>,
     settle_ticks: u32,
 }
 
@@ -100,11 +105,16 @@ impl<'a> Trajectories<'a> {
                 .map(|n| Propagator::new(&plant, length_s * n as f64))
                 .collect()
         };
+        let known = Plant::new(spec);
+        let nominal = observer::differs(&plant, &known).then_some(known);
+        let chain = |part: &Part| Some(ChainStep::new(&plant, nominal.as_ref()?, part.length_s));
         Self {
             table,
             spec,
             plant,
             observed: [1.0, share, share, share],
+            nominal,
+            chains: lateness.parts.iter().map(chain).collect(),
             tick_s,
             pieces: lateness.parts.iter().map(pieces).collect(),
             lateness,
@@ -155,6 +165,12 @@ impl<'a> Trajectories<'a> {
         let mut under_way = UnderWay::new(&self.lateness);
         let (share, _) = adversary.tick(&x);
         let power = self.net_power(Command::NONE.participation, share);
+        // The observer knows the chain at the event.
+        let mut chain: Chain = std::array::from_fn(|i| self.observed[i + 1] * x[i + 1]);
+        if let Some(nominal) = &self.nominal {
+            let step = ChainStep::new(&self.plant, nominal, offset_s);
+            chain = step.step(&x, &chain, power);
+        }
         x = Propagator::new(&self.plant, offset_s).step(&x, power);
         let mut control = ControlLoop::with_table(Ok(self.table.clone()));
         // What the device predicts, for the claim that C1 hands over: the loop does not show it.
@@ -164,8 +180,11 @@ impl<'a> Trajectories<'a> {
             let time_s = offset_s + f64::from(tick) * self.tick_s;
             let (share, error) = adversary.tick(&x);
             let measured = State(std::array::from_fn(|d| {
-                let known = self.observed[d] * x[d] + error[d] * uncertainty.measurement[d];
-                (known * MICRO).floor() as i32
+                let known = match d.checked_sub(1) {
+                    Some(i) if self.nominal.is_some() => chain[i],
+                    _ => self.observed[d] * x[d],
+                };
+                ((known + error[d] * uncertainty.measurement[d]) * MICRO).floor() as i32
             }));
             let decided_on = match self.table.prediction() {
                 Some(prediction) => prediction.predict(measured, &history),
@@ -215,13 +234,17 @@ impl<'a> Trajectories<'a> {
             } else {
                 1.0
             };
-            for (part, pieces) in self.lateness.parts.iter().zip(&self.pieces) {
+            let parts = self.lateness.parts.iter().zip(&self.pieces);
+            for ((part, pieces), step) in parts.zip(&self.chains) {
                 let power = self.net_power(under_way.given(part, early), share);
                 for piece in pieces {
                     let f = piece.step(&x, power)[AXIS_F];
                     if let Some(claim) = self.broken(acting.phase, f) {
                         return breach(claim, f);
                     }
+                }
+                if let Some(step) = step {
+                    chain = step.step(&x, &chain, power);
                 }
                 x = pieces.last().map_or(x, |part| part.step(&x, power));
             }

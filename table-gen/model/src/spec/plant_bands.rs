@@ -4,16 +4,16 @@ use super::origin::{Origin, inconsistent};
 use super::{Spec, SpecError};
 
 /// A parameter of the plant that may lie in a band.
-pub(super) struct PlantBand {
+struct PlantBand {
     /// Key of the band.
-    pub(super) key: &'static str,
+    key: &'static str,
     /// Key of the plant's own number.
     of: &'static str,
     unit: &'static str,
     /// The plant's own number.
     own: f64,
     /// The band, if the spec has one.
-    pub(super) given: Option<[f64; 2]>,
+    given: Option<[f64; 2]>,
 }
 
 impl PlantBand {
@@ -47,7 +47,7 @@ impl PlantBand {
     }
 }
 
-/// H, 1/R_eq and D, which games and responses know in bands.
+/// H, 1/R_eq and D.
 fn of_swing(spec: &Spec) -> [PlantBand; 3] {
     let (plant, bands) = (&spec.plant, &spec.uncertainty);
     [
@@ -75,8 +75,8 @@ fn of_swing(spec: &Spec) -> [PlantBand; 3] {
     ]
 }
 
-/// T_G, T_t, T_1 and T_2, which responses know in bands.
-pub(super) fn of_times(spec: &Spec) -> [PlantBand; 4] {
+/// T_G, T_t, T_1 and T_2.
+fn of_times(spec: &Spec) -> [PlantBand; 4] {
     let (plant, bands) = (&spec.plant, &spec.uncertainty);
     let time = |key, of, own, given| PlantBand {
         key,
@@ -113,23 +113,21 @@ pub(super) fn of_times(spec: &Spec) -> [PlantBand; 4] {
     ]
 }
 
+/// All of them.
+fn all(spec: &Spec) -> impl Iterator<Item = PlantBand> {
+    of_swing(spec).into_iter().chain(of_times(spec))
+}
+
 impl Spec {
-    /// Whether H, 1/R_eq or D may be another than the plant's.
+    /// Whether a parameter of the plant may be another than the plant's own.
     #[must_use]
     pub fn has_plant_band(&self) -> bool {
         let goes = self.uncertainty.inertia_lost_s_per_hz.is_some();
-        goes || of_swing(self).iter().any(PlantBand::is_wider)
-    }
-
-    /// Whether T_G, T_t, T_1 or T_2 may be.
-    #[must_use]
-    pub fn has_time_constant_band(&self) -> bool {
-        of_times(self).iter().any(PlantBand::is_wider)
+        goes || all(self).any(|band| band.is_wider())
     }
 }
 
 /// Checks all of them.
 pub(super) fn check(spec: &Spec, origin: &Origin) -> Result<(), SpecError> {
-    let all = of_swing(spec).into_iter().chain(of_times(spec));
-    all.into_iter().try_for_each(|band| band.check(origin))
+    all(spec).try_for_each(|band| band.check(origin))
 }

@@ -5,7 +5,6 @@ use firmware::response::WINDOW_TICKS_MAX;
 use super::keys::RECOVERY;
 use super::meter::MeterKind;
 use super::origin::{Origin, inconsistent};
-use super::plant_bands;
 use super::sampling::to_whole_ms;
 use super::{Domain, LossProfile, Spec, SpecError};
 use crate::independence::Crowd;
@@ -150,14 +149,9 @@ fn check_games(spec: &Spec, origin: &Origin) -> Result<(), SpecError> {
             format!("{other}, or {is_response}"),
         ))
     };
-    for band in plant_bands::of_times(spec) {
-        if let Some(given) = band.given {
-            return refuse(band.key, format!("{given:?}"), "none");
-        }
-    }
     if spec.has_plant_band() && spec.requirements.containment_hz.is_none() {
         let key = "requirements.containment_hz";
-        let allowed = "a limit of f, since games count H, 1/R_eq and D in bands for f above it";
+        let allowed = "a limit of f, since games count a plant in bands for f above it";
         return Err(inconsistent(origin, key, "none".to_owned(), allowed));
     }
     if uncertainty.own_clocks {

@@ -50,7 +50,7 @@ pub(super) fn covered(table: &TableView<'_>, spec: &Spec) -> Result<(), ClosedLo
             "uncertainty.own_clocks = false is",
         );
     }
-    if spec.has_plant_band() || spec.has_time_constant_band() {
+    if spec.has_plant_band() {
         return unsupported("a plant known in bands", "one plant is");
     }
     if spec.uncertainty.participation > 0.0 || spec.uncertainty.participation_absolute > 0.0 {

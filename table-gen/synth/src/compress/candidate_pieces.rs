@@ -11,7 +11,7 @@
 
 use firmware::table::{AFFINE_FRACTION_BITS, AffineFunction};
 
-use crate::drives::{MICRO, net_power};
+use crate::drives::{MICRO, middle_power};
 use model::flow::Flow;
 use model::grid_shape::GridShape;
 use model::interval::Interval;
@@ -62,7 +62,7 @@ fn law(
     let scale = f64::from(1u32 << AFFINE_FRACTION_BITS);
     // Micro-GW of a level, and of the loss alone.
     let per_level = spec.fleet_power_gw() * spec.input.step * MICRO * gamma;
-    let loss = net_power(spec, 0).mid();
+    let loss = middle_power(spec, 0);
     // Half a level more turns the reader's floor into rounding to nearest.
     let mut constant = (set_point - gamma * loss) / per_level + 0.5;
     let mut factors = [0i16; STATES];

@@ -14,7 +14,7 @@ use rayon::prelude::*;
 
 use crate::abstraction::Abstraction;
 use crate::abstraction::affine::AffineAbstraction;
-use crate::drives::net_power;
+use crate::drives::middle_power;
 use crate::game::bitset::BitSet;
 use model::flow::Flow;
 use model::interval::Interval;
@@ -180,7 +180,7 @@ fn look_ahead(
     let (a, b) = Plant::new(spec).matrices();
     let flow = Flow::over(&a, &b, f64::from(spec.sampling.period_ms()) / 1000.0);
     let phi = flow.phi.map(|row| row.map(Interval::mid));
-    let drive = net_power(spec, input).mid();
+    let drive = middle_power(spec, input);
     let radius = abstraction.radius(input);
     // In cells: the index of a corner is the floor of this.
     let factor = |d: usize, j: usize| phi[d][j] * shape.width[j] / shape.width[d];

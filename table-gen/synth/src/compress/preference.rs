@@ -22,7 +22,7 @@ use model::plant::STATES;
 use model::spec::Spec;
 
 use super::CompressError;
-use crate::drives::{MICRO, net_power};
+use crate::drives::{MICRO, middle_power};
 use crate::game::levels::{nearest, widened};
 
 /// The preferred law.
@@ -56,7 +56,7 @@ impl Preference {
     ) -> Result<AffineFunction, CompressError> {
         let plant = &spec.plant;
         let gain_gw_per_hz = 2.0 * plant.inertia_gw_s_per_hz * self.recovery_per_s;
-        let loss_gw = -net_power(spec, 0).mid() / MICRO;
+        let loss_gw = -middle_power(spec, 0) / MICRO;
         // Of a level, in micro-units of power as the grid's cells are.
         let per_level = spec.fleet_power_gw() * spec.input.value(1) * MICRO;
         let mut slopes = [0.0; STATES];

@@ -207,10 +207,6 @@ fn response(more: &[&str]) -> Vec<String> {
 #[test]
 fn what_games_do_not_cover_is_refused_by_its_key_and_taken_for_a_response() {
     let only_responses = [
-        "uncertainty.governor_time_s=[2, 3]",
-        "uncertainty.turbine_time_s=[0.4, 0.6]",
-        "uncertainty.lead_time_s=[1, 3]",
-        "uncertainty.lag_time_s=[10, 14]",
         "uncertainty.own_clocks=true",
         "uncertainty.participation_absolute=0.01",
         "meter.kind=zero-crossing",
@@ -228,6 +224,10 @@ fn what_games_do_not_cover_is_refused_by_its_key_and_taken_for_a_response() {
         "uncertainty.inertia_lost_s_per_hz=0.05",
         "uncertainty.governor_gain_gw_per_hz=[-5, -4.9]",
         "uncertainty.damping_gw_per_hz=[0.9, 1]",
+        "uncertainty.governor_time_s=[2, 3]",
+        "uncertainty.turbine_time_s=[0.4, 0.6]",
+        "uncertainty.lead_time_s=[1, 3]",
+        "uncertainty.lag_time_s=[10, 14]",
     ] {
         with(&[option]).unwrap();
         let unlimited = [option, "requirements.containment_hz=none"];
