@@ -13,6 +13,7 @@ use firmware::link::{Request, Setup, SourceKind};
 use firmware::table::TableView;
 
 use fw::board::{self, BoardError};
+use fw::c_api::library::RV32IMC;
 use fw::c_api::program::{CORTEX_M0, CORTEX_M4};
 use fw::c_api::{self, CApiError};
 use fw::costs;
@@ -447,7 +448,12 @@ fn c_interface((scenarios, ticks): (u64, u32), out: &Path, bless: bool) -> Resul
         tables.push((name, c_api::table(name)?));
     }
     let library = |place| c_api::library_of(place, &libraries);
-    let figures = c_api::costs::measure(library(CORTEX_M4)?, library(CORTEX_M0)?, &tables)?;
+    let cores = [
+        library(CORTEX_M4)?,
+        library(CORTEX_M0)?,
+        c_api::library_for(RV32IMC, &libraries)?,
+    ];
+    let figures = c_api::costs::measure(cores, &tables)?;
     print!("{}", figures.text());
     Ok(figures.check("c-api.txt", bless)?)
 }

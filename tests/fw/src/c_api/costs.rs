@@ -28,6 +28,20 @@ const TICKS: u32 = 600;
 /// Sections of the library in a linked program, by `mps2.ld`.
 const SECTIONS: [&str; 2] = [".holdfast_text", ".holdfast_rodata"];
 
+/// What `size.c` calls of the library, and what `replay.c` calls beside.
+const PROVIDER: [&str; 5] = [
+    "holdfast_init",
+    "holdfast_tick",
+    "holdfast_tick_ms",
+    "holdfast_read_table",
+    "holdfast_default_config",
+];
+const CROSSINGS: [&str; 3] = [
+    "holdfast_captures_init",
+    "holdfast_captures_add",
+    "holdfast_captures_read",
+];
+
 /// A core, its library, and its goal for code.
 struct Core<'p> {
     name: &'static str,
@@ -36,11 +50,14 @@ struct Core<'p> {
     code_max: u32,
 }
 
-/// Measures all; the libraries are those of the M4F and the M0+.
+/// Measures all; the libraries are those of the M4F, the M0+ and RV32IMC.
 ///
 /// # Errors
 /// A program cannot be linked or run, or its answers differ from the library's.
-pub fn measure(m4: &Path, m0: &Path, tables: &[(&str, Vec<u8>)]) -> Result<Figures, CApiError> {
+pub fn measure(
+    [m4, m0, riscv]: [&Path; 3],
+    tables: &[(&str, Vec<u8>)],
+) -> Result<Figures, CApiError> {
     let mut figures = Figures::default();
     figures.note(&compiler());
     let folder = tempfile::tempdir().map_err(io_error("temporary folder"))?;
@@ -61,6 +78,7 @@ pub fn measure(m4: &Path, m0: &Path, tables: &[(&str, Vec<u8>)]) -> Result<Figur
     for core in &cores {
         code(core, folder.path(), &mut figures)?;
     }
+    code_alone(riscv, folder.path(), &mut figures)?;
     let [m4, _] = &cores;
     let mut first = true;
     for (name, bytes) in tables {
@@ -105,30 +123,59 @@ fn code(core: &Core<'_>, folder: &Path, figures: &mut Figures) -> Result<(), CAp
     for (what, file, goal) in programs {
         let out = folder.join("linked");
         program::link_bare(core.place, &[file, "cortex_m.c"], core.library, &out)?;
-        let elf = Elf::read(&out)?;
-        let bytes = elf
-            .sections()?
-            .iter()
-            .filter(|section| SECTIONS.contains(&section.name.as_str()))
-            .map(|section| section.size)
-            .sum();
-        let name = format!("{what}, {}: code and constants", core.name);
-        figures.line(&name, bytes, "bytes", goal);
-        let symbols = elf.symbols()?;
-        let forbidden = [
-            (
-                "panic functions",
-                &["panicking", "panic_fmt", "unwrap_failed", "expect_failed"][..],
-            ),
-            (
-                "allocation functions",
-                &["__rust_alloc", "__rg_alloc", "5alloc"],
-            ),
-        ];
-        for (kind, parts) in forbidden {
-            let name = format!("{what}, {}: {kind}", core.name);
-            figures.line(&name, count(&symbols, parts), "symbols", Some(0));
-        }
+        let name = format!("{what}, {}", core.name);
+        measured(&name, &Elf::read(&out)?, goal, figures)?;
+    }
+    Ok(())
+}
+
+/// The same for RV32IMC, where no C compiler is at hand: the functions that those programs call.
+fn code_alone(library: &Path, folder: &Path, figures: &mut Figures) -> Result<(), CApiError> {
+    let both = [&PROVIDER[..], &CROSSINGS].concat();
+    for (what, functions) in [
+        ("provider", &PROVIDER[..]),
+        ("provider and crossings", &both),
+    ] {
+        let out = folder.join("alone");
+        program::link_alone(library, functions, &out)?;
+        measured(
+            &format!("{what}, RV32IMC"),
+            &Elf::read(&out)?,
+            None,
+            figures,
+        )?;
+    }
+    Ok(())
+}
+
+/// The library's bytes in a linked program, and what must not be in it.
+fn measured(
+    name: &str,
+    elf: &Elf,
+    goal: Option<u32>,
+    figures: &mut Figures,
+) -> Result<(), CApiError> {
+    let sections = elf.sections()?;
+    let sections = sections.iter();
+    let bytes = sections
+        .filter(|section| SECTIONS.contains(&section.name.as_str()))
+        .map(|section| section.size)
+        .sum();
+    figures.line(&format!("{name}: code and constants"), bytes, "bytes", goal);
+    let symbols = elf.symbols()?;
+    let forbidden = [
+        (
+            "panic functions",
+            &["panicking", "panic_fmt", "unwrap_failed", "expect_failed"][..],
+        ),
+        (
+            "allocation functions",
+            &["__rust_alloc", "__rg_alloc", "5alloc"],
+        ),
+    ];
+    for (kind, parts) in forbidden {
+        let found = count(&symbols, parts);
+        figures.line(&format!("{name}: {kind}"), found, "symbols", Some(0));
     }
     Ok(())
 }

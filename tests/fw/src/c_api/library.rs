@@ -7,12 +7,10 @@ use std::process::{Command, Stdio};
 use super::error::{CApiError, io_error};
 use crate::root;
 
+/// Target of RISC-V cores without floating point.
+pub const RV32IMC: &str = "riscv32imc-unknown-none-elf";
 /// Cores that the library is built for, beside the host.
-pub const CORES: [&str; 3] = [
-    "thumbv7em-none-eabihf",
-    "thumbv6m-none-eabi",
-    "riscv32imc-unknown-none-elf",
-];
+pub const CORES: [&str; 3] = ["thumbv7em-none-eabihf", "thumbv6m-none-eabi", RV32IMC];
 /// Name of the library's file.
 pub const FILE: &str = "libholdfast.a";
 

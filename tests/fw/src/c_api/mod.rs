@@ -75,7 +75,17 @@ pub fn library_of<'l>(
     place: Place,
     libraries: &'l [(&'static str, PathBuf)],
 ) -> Result<&'l Path, CApiError> {
-    let name = place.target.unwrap_or("host");
+    library_for(place.target.unwrap_or("host"), libraries)
+}
+
+/// The library of a target among those built.
+///
+/// # Errors
+/// It is not there.
+pub fn library_for<'l>(
+    name: &str,
+    libraries: &'l [(&'static str, PathBuf)],
+) -> Result<&'l Path, CApiError> {
     libraries
         .iter()
         .find(|(target, _)| *target == name)

@@ -141,6 +141,38 @@ pub fn link_bare(
     run(&mut compiler, ARM_COMPILER).map(drop)
 }
 
+/// Sections of a library that is linked alone, named as `mps2.ld` names them.
+const ALONE: &str = "SECTIONS {
+  .holdfast_text : { *(.text .text.*) }
+  .holdfast_rodata : { *(.rodata .rodata.* .srodata .srodata.*) }
+  /DISCARD/ : { *(.eh_frame .eh_frame.*) }
+}
+ASSERT(SIZEOF(.data) + SIZEOF(.sdata) + SIZEOF(.bss) + SIZEOF(.sbss) == 0, \"the library has variables\")
+";
+
+/// Links what these functions of a library need, and nothing else, where no C compiler is at hand:
+/// by the linker that comes with the Rust compiler. What they call is all in the library.
+///
+/// # Errors
+/// The linker is missing, or something that is called is.
+pub fn link_alone(library: &Path, functions: &[&str], out: &Path) -> Result<(), CApiError> {
+    let mut rustc = Command::new("rustc");
+    let place = run(rustc.args(["--print", "target-libdir"]), "rustc")?;
+    let linker = Path::new(place.trim()).join("../bin/rust-lld");
+    let script = out.with_extension("ld");
+    fs::write(&script, ALONE).map_err(io_error("linker script"))?;
+    let mut linker = Command::new(linker);
+    linker
+        .args(["-flavor", "gnu", "--gc-sections", "--no-undefined"])
+        .args(functions.iter().map(|name| format!("--undefined={name}")))
+        .args(functions.first().map(|name| format!("--entry={name}")))
+        .arg("--script")
+        .args([script.as_path(), library])
+        .arg("-o")
+        .arg(out);
+    run(&mut linker, "rust-lld").map(drop)
+}
+
 /// Compiles the replay for a place and says where it is.
 ///
 /// # Errors
