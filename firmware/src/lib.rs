@@ -96,4 +96,4 @@ pub mod retained;
 
 pub mod link;
 
-mod wide;
+pub mod wide;

@@ -9,7 +9,7 @@
 ///
 /// By hand as at school, with two digits of 16 bits.
 #[inline(never)]
-pub(crate) const fn divide(numerator: u64, divisor: u32) -> u32 {
+pub const fn divide(numerator: u64, divisor: u32) -> u32 {
     let (high, low) = ((numerator >> 32) as u32, numerator as u32);
     if high >= divisor {
         return u32::MAX;

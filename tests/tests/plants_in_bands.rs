@@ -87,7 +87,7 @@ fn the_scorecard_has_every_corner_and_each_is_that_plants_own_scorecard() {
     };
     let found = compare(&spec, &table, &of(&spec), &|| true).unwrap();
     assert_eq!(found.rows.len(), 5 * Controller::ALL.len());
-    let views = of(&spec).grids.views(&found);
+    let views = found.views(&of(&spec).grids);
     assert_eq!(views.len(), 2);
     // The lightest grid with the weakest governors, asked for as a plant of its own.
     let corner = self::spec(&[

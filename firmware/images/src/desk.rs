@@ -146,6 +146,7 @@ impl<'b, F: MultiwriteNorFlash, G: Mapped, K: Verify> Desk<'b, F, G, K> {
     /// A desk of a charger before its first tick. `device` is the service; `None` lets go by what
     /// comes. Without `slots` the run is a guarded one. `table` is what the charger runs; `inbox`
     /// is where containers are collected.
+    #[inline(never)]
     pub const fn new(
         device: Option<Device<F>>,
         slots: Option<Slots<G, K>>,

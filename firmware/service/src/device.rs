@@ -194,7 +194,9 @@ impl<F: MultiwriteNorFlash> Device<F> {
         let Some(copied) = copy.get_mut(..record.len()) else {
             return;
         };
-        copied.copy_from_slice(record);
+        for (to, from) in copied.iter_mut().zip(record) {
+            *to = *from;
+        }
         let Some((id, asked)) = read_ask(copied) else {
             return;
         };

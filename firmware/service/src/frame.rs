@@ -4,6 +4,7 @@
 //! the records here begin with [`ASK`] or [`ANSWER`], so that both share a line and a reader of the
 //! one skips the other.
 
+use cobs::{DecodeResult, DecoderState};
 use firmware::table::{CRC_LEN, checksum};
 
 /// First byte of what a charger is asked: version 1.
@@ -26,7 +27,9 @@ pub fn encode<'b>(record: &[u8], buffer: &'b mut [u8; FRAME_MAX]) -> &'b [u8] {
     let Some(crc) = rest.first_chunk_mut::<CRC_LEN>() else {
         return &[];
     };
-    start.copy_from_slice(record);
+    for (to, from) in start.iter_mut().zip(record) {
+        *to = *from;
+    }
     *crc = checksum(record).to_le_bytes();
     let body = body.get(..record.len() + CRC_LEN).unwrap_or_default();
     let Ok(written) = cobs::try_encode(body, buffer) else {
@@ -38,11 +41,33 @@ pub fn encode<'b>(record: &[u8], buffer: &'b mut [u8; FRAME_MAX]) -> &'b [u8] {
     buffer.get(..=written).unwrap_or_default()
 }
 
+/// What COBS made these bytes of, up to the first zero; `None` for bytes that it does not make, and
+/// for none. The bytes are overwritten. Byte by byte: the crate's own function in place checks its
+/// indices by panics.
+fn unstuff(bytes: &mut [u8]) -> Option<&[u8]> {
+    let mut state = DecoderState::Idle;
+    let mut length = 0;
+    // A byte of the record is put where one of the frame was, at the latest.
+    for at in 0..bytes.len() {
+        let byte = *bytes.get(at)?;
+        if byte == 0 {
+            break;
+        }
+        if let DecodeResult::DataContinue(byte) = state.feed(byte).ok()? {
+            *bytes.get_mut(length)? = byte;
+            length += 1;
+        }
+    }
+    let DecodeResult::DataComplete = state.feed(0).ok()? else {
+        return None;
+    };
+    bytes.get(..length)
+}
+
 /// The record of the bytes up to a delimiter, without it; `None` for bytes that are no frame. The
 /// bytes are overwritten.
 pub fn decode(bytes: &mut [u8]) -> Option<&[u8]> {
-    let length = cobs::decode_in_place(bytes).ok()?;
-    let (record, crc) = bytes.get(..length)?.split_last_chunk::<CRC_LEN>()?;
+    let (record, crc) = unstuff(bytes)?.split_last_chunk::<CRC_LEN>()?;
     (checksum(record) == u32::from_le_bytes(*crc)).then_some(record)
 }
 
@@ -97,6 +122,27 @@ mod tests {
     }
 
     proptest! {
+        #[test]
+        fn any_bytes_decode_as_by_the_crate(
+            bytes in proptest::collection::vec(prop_oneof![Just(0u8), 1u8..6, any::<u8>()], 0..FRAME_MAX),
+            record in proptest::collection::vec(any::<u8>(), 0..=RECORD_MAX),
+            at in 0usize..FRAME_MAX,
+            change in any::<u8>(),
+        ) {
+            let mut near = encode(&record, &mut [0; FRAME_MAX]).to_vec();
+            if let Some(byte) = near.get_mut(at) {
+                *byte ^= change;
+            }
+            for bytes in [bytes, near] {
+                let (mut found, mut theirs) = (bytes.clone(), bytes);
+                let found = unstuff(&mut found).map(<[u8]>::to_vec);
+                // To the crate nothing before the first zero is an empty frame; here it is none.
+                let is_some = theirs.first().is_some_and(|byte| *byte != 0);
+                let length = cobs::decode_in_place(&mut theirs).ok().filter(|_| is_some);
+                prop_assert_eq!(found, length.map(|length| theirs[..length].to_vec()));
+            }
+        }
+
         #[test]
         fn records_come_back_from_a_line_with_rubbish_between(
             records in proptest::collection::vec(proptest::collection::vec(any::<u8>(), 0..=RECORD_MAX), 1..5),

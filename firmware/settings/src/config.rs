@@ -16,6 +16,7 @@ use firmware::fault::Faults;
 use firmware::frequency::{FrequencyError, FrequencySource, NOMINAL_HZ, Reading};
 use firmware::response::LevelOffset;
 use firmware::table::{Direction, TICK_MS_MAX};
+use firmware::wide::divide;
 
 use embedded_hal::digital::OutputPin;
 use embedded_hal::pwm::SetDutyCycle;
@@ -48,7 +49,7 @@ impl Values {
         // At most 3 phases of 1 kV and 80 A: 240 kW, and 2.4e11 mW.
         let milliwatts =
             u64::from(self.get(Key::Phases) * self.get(Key::Voltage)) * u64::from(current_ma);
-        u32::try_from(milliwatts / 1_000).unwrap_or(u32::MAX)
+        divide(milliwatts, 1_000)
     }
 
     /// Which way power can be moved.

@@ -141,7 +141,7 @@ pub(super) fn run(args: &CompareArgs) -> Result<(), Failure> {
     }
     output::line(verdict.sentence());
     output::line(quiet::sentence(&monitored));
-    for view in config.grids.views(&found) {
+    for view in found.views(&config.grids) {
         output::line(format_args!("{}; nadirs in Hz", view.caption));
         let mut table = output::table(&scorecard::HEADER);
         for row in scorecard::rows(&view) {

@@ -14,6 +14,7 @@
 //! | [`course`] | the grid in time, and what is measured on the way |
 //! | [`grids`] | the plants: the spec's own, other inertias, the corners of its bands |
 //! | [`quiet`] | how often a charger's command changed |
+//! | [`views`] | what is shown of it |
 //! | [`verdict`] | where the table loses to the droop |
 
 pub mod chargers;
@@ -22,6 +23,7 @@ pub mod grids;
 mod outcome;
 pub mod quiet;
 pub mod verdict;
+pub mod views;
 
 use firmware::table::TableView;
 use rayon::prelude::*;

@@ -3,8 +3,8 @@
 use super::figure::{Axis, Curve, Figure};
 use super::palette::Colour;
 use super::section::{DataTable, Section};
-use crate::compare::grids::View;
 use crate::compare::verdict::{Measure, Verdict};
+use crate::compare::views::View;
 use crate::compare::{CompareConfig, Controller, Row, Scorecard};
 
 /// Room above and below the curves \[Hz\].
@@ -27,7 +27,7 @@ pub fn scorecard(spec: &str, config: &CompareConfig, found: &Scorecard) -> Secti
             config.trigger_hz,
             config.duration_s
         ));
-    for view in config.grids.views(found) {
+    for view in found.views(&config.grids) {
         section.tables.push(table(&view));
     }
     section.figures = figures(spec, config, found);
@@ -36,7 +36,7 @@ pub fn scorecard(spec: &str, config: &CompareConfig, found: &Scorecard) -> Secti
 
 /// The figures of the scorecard: for each of its views the nadir, then the final frequency.
 pub fn figures(spec: &str, config: &CompareConfig, found: &Scorecard) -> Vec<Figure> {
-    let views = config.grids.views(found).into_iter();
+    let views = found.views(&config.grids).into_iter();
     views
         .flat_map(|view| Measure::ALL.map(|measure| figure(spec, measure, &view)))
         .collect()
