@@ -1,5 +1,5 @@
-//! What is shown of a scorecard: a table and figures for each plant that was asked for, and the worst
-//! of all corners.
+//! What is shown of a scorecard: a table and figures for each plant that was asked for, and the
+//! worst of all corners.
 
 use super::grids::Grids;
 use super::{Controller, Outcome, Row, Scorecard};
