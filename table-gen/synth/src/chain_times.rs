@@ -16,7 +16,7 @@
 //! | constant | lags in the row | lead |
 //! |---|---|---|
 //! | T_G | T_G, g, T_t, T_2 | T_1 |
-//! | T_t | g, T_2, T_t, t | T_1 |
+//! | T_t | g, T_t, t, T_2 | T_1 |
 //! | T_1 | g, t, s | |
 //! | T_2 | g, t, s, T_2 | T_1 |
 //!
@@ -68,7 +68,7 @@ pub(crate) fn off(spec: &Spec, asked: Interval, offset: &[Interval; STATES]) -> 
         }
     };
     let share = of(change[0], &[governor, g, turbine, lag], lead)
-        + of(change[1], &[g, lag, turbine, t], lead)
+        + of(change[1], &[g, turbine, t, lag], lead)
         + of(change[2], &[g, t, s], 0.0)
         + of(change[3], &[g, t, s, lag], lead);
     let most = asked.radius() * share + of_offset(own, bands, offset);

@@ -11,6 +11,7 @@
 //! | [`adversaries`] | who chooses the disturbances |
 //! | [`crowd`] | chargers with own clocks and errors; commands act anywhere within the delays |
 //! | `readers` | the same crowd where the law is a response: what reads the same decides once |
+//! | `sliding` | its least and greatest commands under way
 //! | `draw` | what is drawn of a trajectory against a fleet |
 //! | `judge` | the claims about f along it |
 //! | `fleet` | the search against a whole fleet, on a plant and losses that are drawn |
@@ -37,6 +38,7 @@ mod found;
 mod judge;
 mod observer;
 mod readers;
+mod sliding;
 pub mod trajectory;
 mod under_way;
 pub mod witness;

@@ -5,7 +5,8 @@
 //! target are the same for them: those are computed once for all of them. What differs is the
 //! level that each takes of the target, by its serial number. All of it is the firmware's code.
 //! What may act at a part depends on the clock alone, so that the least and the greatest of the
-//! commands under way are sought row by row, and only where a row differs from the one before.
+//! commands under way are sought row by row ([`super::sliding`]), and only where a row differs from
+//! the one before.
 //!
 //! The same seed gives the same crowd as [`super::crowd::Crowd::draw`], to the bit.
 
@@ -18,6 +19,7 @@ use firmware::units::{MICRO, Participation, STATES};
 
 use super::adversaries::Random;
 use super::crowd::{Answers, CrowdTimes, DrawnMember, Error, PARTS, UnderWay, draw_members};
+use super::sliding::Sliding;
 
 /// Chargers of one clock whose meters err alike.
 #[derive(Debug, Clone)]
@@ -47,7 +49,7 @@ struct Clock {
     /// Sums over the chargers of the least and the greatest that may act now \[ppm\].
     sums_ppm: (u64, u64),
     /// Least and greatest of each charger.
-    ends_ppm: (Vec<u32>, Vec<u32>),
+    sliding: Sliding,
 }
 
 /// The chargers.
@@ -175,7 +177,7 @@ impl Clock {
             differs: vec![false; kept],
             changed: 0,
             sums_ppm: (0, 0),
-            ends_ppm: (vec![0; members.len()], vec![0; members.len()]),
+            sliding: Sliding::new(members.len(), kept),
         }
     }
 
@@ -219,20 +221,9 @@ impl Clock {
             let all = sum(first);
             (all, all)
         } else {
-            let (least, most) = &mut self.ends_ppm;
-            least.copy_from_slice(first);
-            most.copy_from_slice(first);
-            for tick in ticks.start + 1..ticks.end {
-                if !self.differs[tick % kept] {
-                    continue;
-                }
-                let row = &self.commands_ppm[tick % kept];
-                for ((least, most), ppm) in least.iter_mut().zip(most.iter_mut()).zip(row) {
-                    *least = (*least).min(*ppm);
-                    *most = (*most).max(*ppm);
-                }
-            }
-            (sum(least), sum(most))
+            let (rows, differs) = (&self.commands_ppm, &self.differs);
+            let ends = self.sliding.ends(ticks.clone(), rows, differs);
+            (sum(&ends.least), sum(&ends.most))
         };
         (if *or_nothing { 0 } else { least_ppm }, most_ppm)
     }
