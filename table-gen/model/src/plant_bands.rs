@@ -187,6 +187,28 @@ mod tests {
         }
     }
 
+    /// What a spec says of itself, from a list of keys, agrees with this list of parameters.
+    #[test]
+    fn every_key_of_a_band_is_a_parameter() {
+        for (key, band) in [
+            ("inertia_gw_s_per_hz", "[3.9,4.1]"),
+            ("governor_gain_gw_per_hz", "[-5.1,-4.9]"),
+            ("damping_gw_per_hz", "[0.9,1.1]"),
+            ("governor_time_s", "[2.4,2.6]"),
+            ("turbine_time_s", "[0.4,0.6]"),
+            ("lead_time_s", "[1.9,2.1]"),
+            ("lag_time_s", "[11,13]"),
+        ] {
+            let spec = spec(&[&format!("uncertainty.{key}={band}")]);
+            let bands = PlantBands::of(&spec);
+            assert!(spec.has_plant_band() && bands.bands().len() == 1, "{key}");
+            let name = serde_json::to_value(bands.bands()[0].parameter).unwrap();
+            assert_eq!(name, key);
+        }
+        let spec = spec(&["uncertainty.inertia_lost_s_per_hz=0.1"]);
+        assert!(spec.has_plant_band() && PlantBands::of(&spec).holds(Parameter::Inertia));
+    }
+
     #[test]
     fn each_corner_comes_once_and_nothing_else_moves() {
         let spec = spec(&[

@@ -77,14 +77,12 @@ pub(super) struct SimulateArgs {
 }
 
 impl SimulateArgs {
-    /// How the firmware is to know the state: of a plant that is drawn nobody could tell it, and
-    /// what is proven of such plants is proven of its observer.
+    /// How the firmware is to know the state.
     fn estimator(&self, draws: Option<&Draws>) -> Estimator {
-        let drawn = draws.is_some_and(|draws| !draws.plant.bands().is_empty());
-        if self.observer || drawn {
-            Estimator::Observer
-        } else {
-            Estimator::FullState
+        match draws {
+            _ if self.observer => Estimator::Observer,
+            Some(draws) => draws.estimator(),
+            None => Estimator::FullState,
         }
     }
 

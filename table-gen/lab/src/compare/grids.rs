@@ -31,7 +31,7 @@ impl Grid {
 pub struct Grids {
     /// The spec's own plant, or what else was asked for; each has a table and figures.
     pub asked: Vec<Grid>,
-    /// All corners of the spec's bands, which are told together.
+    /// All corners of the spec's bands but its own plant, which are told together.
     pub corners: Vec<Grid>,
 }
 
@@ -39,13 +39,15 @@ impl Grids {
     /// The spec's own plant, and the corners of its bands.
     pub fn of(spec: &Spec) -> Self {
         let bands = PlantBands::of(spec);
+        let own = Plant::new(spec);
         let corner = |plant| Grid {
             name: bands.told(plant),
             plant,
         };
+        let corners = bands.corners().filter(|plant| *plant != own);
         Self {
             asked: vec![Grid::of_inertia(spec, spec.plant.inertia_gw_s_per_hz)],
-            corners: bands.corners().map(corner).collect(),
+            corners: corners.map(corner).collect(),
         }
     }
 
@@ -72,6 +74,15 @@ impl Grids {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// A band that begins at the own number has the own plant as a corner: one row a loss, not two.
+    #[test]
+    fn no_plant_comes_twice() {
+        let set = ["uncertainty.inertia_gw_s_per_hz=[4,5]".to_owned()];
+        let grids = Grids::of(&Spec::load("gb-bi", &set).unwrap());
+        let names: Vec<&str> = grids.all().map(|grid| grid.name.as_str()).collect();
+        assert_eq!(names, ["H = 4", "H = 5"]);
+    }
 
     #[test]
     fn inertias_asked_for_leave_the_bands_out() {

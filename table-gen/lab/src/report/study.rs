@@ -64,7 +64,7 @@ impl Study {
             participation_error: PAPER_ERROR,
             ..Draws::of(spec)
         };
-        let closed_loop = ClosedLoop::new(spec, &table, full)?;
+        let closed_loop = ClosedLoop::new(spec, &table, draws.estimator())?;
         // Nothing interrupts: the closure always says to go on.
         let robustness = loop {
             if let Some(statistics) = monte_carlo::run(&closed_loop, &draws, runs, 0, &|| true) {

@@ -5,6 +5,7 @@ use rand_pcg::Pcg64;
 use serde::Serialize;
 
 use crate::simulation::chance::{between, unit};
+use crate::simulation::closed_loop::Estimator;
 use crate::simulation::scenario::{Scenario, ScenarioError};
 use model::plant::{Plant, STATES};
 use model::plant_bands::{Band, PlantBands};
@@ -88,6 +89,17 @@ impl Draws {
         }
         let mut random = Pcg64::new(u128::from(seed), PLANT_STREAM);
         Some(self.plant.at(|band| between(&mut random, band.within)))
+    }
+
+    /// How the firmware comes to know the state, where it would be told that of a plant that is
+    /// known. Of one that is drawn nobody could tell it, and what is proven of such plants is
+    /// proven of its observer.
+    pub fn estimator(&self) -> Estimator {
+        if self.plant.bands().is_empty() {
+            Estimator::FullState
+        } else {
+            Estimator::Observer
+        }
     }
 
     /// Checks every number.
